@@ -1,37 +1,45 @@
 """How accurate: known warps and real people, against other packages.
 
-    pip install . dtaidistance tslearn gdtw fdasrsf aeon
-    python benchmarks/accuracy.py DATA_FOLDER [TABLES ...]
+    pip install . dtaidistance tslearn gdtw fdasrsf aeon affinewarp scikit-fda
+    python benchmarks/accuracy.py DATA_FOLDER [TABLES ...] [--peers]
 
-TABLES are some of refining, bends, known-warps, time-line and people; without them all are printed.
-Tables that are named are without peers, unless peers is named as well.
-DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form; without
-it only known warps and made-up bends are run. Every peer is fed postures and velocities (smoothed
-over 3 % of the clip). Aligned pairs are reported at the best of a peer's settings, for each number
-of each cell by itself; of common time lines, every setting is shown. Ours have one setting for all.
-Peers that are not installed are left out; of people, events.py has what the best of them reached.
-Prints Markdown.
+DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form. Every
+peer is fed postures and velocities (smoothed over 3 % of the clip). Aligned pairs are reported at
+the best of a peer's settings, for each number of each cell by itself; of common time lines, every
+setting is shown. Ours have one setting for all. Of people, harness.py has what the best peers
+reached, where they are not installed. Prints Markdown.
 """
 
-import importlib.metadata
 import sys
 import time
 import warnings
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import peers
-from events import EVENTS, THROW, P
+from harness import (
+    EVENTS,
+    THROW,
+    P,
+    command_line,
+    fewer_clips,
+    figures,
+    geometric_means,
+    print_head,
+    print_row,
+    print_versions,
+    ratio,
+    read_people,
+    run_tables,
+    show_pair,
+)
 from joblib import Parallel, delayed
-from people import fewer_clips, figures, geometric_means, ratio, read_people
 from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
     KeyframeSynchronizer,
     LinearSynchronizer,
-    __version__,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.filters import SMOOTHING, smooth
@@ -102,7 +110,7 @@ def known_warps(seed, lowest, highest, noise, n=8, n_features=16, gain=0.05):
     return X, np.array(truth)
 
 
-def known_table():
+def known_table(folder):
     """Mean error in frames of 100, copy 0 against the others, four random sets a cell."""
     sets = {cell: [known_warps(seed, *cell) for seed in range(4)] for cell in CELLS}
 
@@ -196,7 +204,7 @@ def with_peer():
 
 
 def best_peer(people):
-    """Mean and median error of the best peer: as measured here, or else as in events.py."""
+    """Mean and median error of the best peer: as measured here, or else as in harness.py."""
 
     def row(align, kind):
         warps = [one.to_patterns(partial(peer_to, align, kind)) for one in people]
@@ -350,7 +358,7 @@ def refinement_cases(folder):
         points = ASpace().fit_transform(postures)
         name = f"make_bending, style {style:g}"
         yield name, points, "median", lambda times, n, b=bunch: group_timing_error(times, b.times)
-    for one in read_people(folder) if folder is not None else ():
+    for one in read_people(folder):
         everyone = np.arange(len(one.X))
         for n_features in (None, 3, 2, 1):
             some = "" if n_features is None else f", first {n_features} feature(s)"
@@ -378,7 +386,7 @@ def error_of_events(one, chosen):
     return error
 
 
-def bending_table():
+def bending_table(folder):
     """make_bending, four random sets: key-frames missed, and timing error without a pattern."""
     given = "`KeyframeSynchronizer`, true key-frames"
     makers = {name: OURS[name] for name in list(OURS)[:4]}
@@ -453,19 +461,6 @@ def show_mean(settings):
     return f"{min(settings):.3f}"
 
 
-def show_pair(figures):
-    return f"{figures[0]:.2f} / {figures[1]:.2f}"
-
-
-def print_head(corner, header):
-    print(f"\n| {corner} | " + " | ".join(header) + " |")
-    print("|---|" + "---|" * len(header))
-
-
-def print_row(name, cells):
-    print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
-
-
 def print_table(corner, header, rows, show):
     """Markdown; a cell holds a tuple with one value a setting, or a single value."""
     print_head(corner, header)
@@ -473,30 +468,22 @@ def print_table(corner, header, rows, show):
         print_row(name, [show(cell if isinstance(cell, tuple) else (cell,)) for cell in cells])
 
 
-def main():
-    """Print the tables."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
-    tables = {
-        "refining": partial(refinement_table, folder),
-        "bends": bending_table,
-        "known-warps": known_table,
-    }
-    if folder is not None:
-        tables["time-line"] = partial(time_line_tables, folder)
-        tables["people"] = partial(people_tables, folder)
-    named = sys.argv[2:]
-    if named and "peers" not in named:
+TABLES = {
+    "refining": refinement_table,
+    "bends": bending_table,
+    "known-warps": known_table,
+    "time-line": time_line_tables,
+    "people": people_tables,
+}
+
+
+def prepare(options):
+    if not options.peers:
         peers.leave_out()
-    chosen = [tables[name] for name in named if name != "peers"] or tables.values()
-    versions = {"sklearn_motionsync": __version__}
-    for label, (name, *_) in (peers.PEERS | peers.TIME_LINES).items():
-        versions[name] = peers.installed(label)
-    for name in ("numpy", "scipy", "scikit-learn"):
-        versions[name] = importlib.metadata.version(name)
-    print(", ".join(f"{name} {version}" for name, version in versions.items() if version))
-    for print_tables in chosen:
-        print_tables()
+    print_versions(*dict.fromkeys(name for name, *_ in (peers.PEERS | peers.TIME_LINES).values()))
 
 
 if __name__ == "__main__":
-    main()
+    command = command_line(__doc__)
+    command.add_argument("--peers", action="store_true", help="with other packages")
+    run_tables(TABLES, command, prepare)

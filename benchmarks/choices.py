@@ -2,7 +2,7 @@
 
     python benchmarks/choices.py DATA_FOLDER
 
-The 16 events of events.py that peers were measured on: geometric means over the events of the mean
+The 16 events of harness.py that peers were measured on: geometric means over the events of the mean
 and of the median error, in frames of 100. Of all ordered pairs with six patterns an action, and of
 all pairs on the one common time line that a fit gives, as a set is used.
 Health of the warps, in the mean over actions: share of frames that stand still (rate below 0.1)
@@ -19,8 +19,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from events import EVENTS, P
-from people import figures, geometric_means, read_people
+from harness import EVENTS, P, figures, geometric_means, read_people
 from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
 from sklearn_motionsync.matching import consensus, costs, metric
 from sklearn_motionsync.synchronizers import learning

@@ -37,11 +37,20 @@ from typing import NamedTuple
 from unittest.mock import patch
 
 import numpy as np
-from accuracy import known_warps, print_head, print_row
-from events import EVENTS, P, moment
+from accuracy import known_warps
+from harness import (
+    DATA,
+    EVENTS,
+    P,
+    figures,
+    geometric_means,
+    moment,
+    on_time_line,
+    print_head,
+    print_row,
+    read_people,
+)
 from joblib import Parallel, delayed
-from jobs import DATA
-from people import figures, geometric_means, on_time_line, read_people
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.metrics import timing_error
 

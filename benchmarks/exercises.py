@@ -1,30 +1,20 @@
 """Exercises done right and wrong: learnt from right trials of other people, one person left out.
 
-    pip install .
-    python benchmarks/exercises.py DATA_FOLDER
+    python benchmarks/exercises.py DATA_FOLDER [right-or-wrong] [sides]
 
 DATA_FOLDER holds uiprmd/uiprmd_odd_positions.npz: five exercises of ten people. Everything is
 learnt from the right trials with odd numbers of nine people and judges all trials of the tenth but
 the first three right ones, which are the reference where there is one. The baseline is the mean
 squared z of cosines after linear normalisation. All five exercises were looked at while the weights
-of the tests were chosen. Then the wrong side: trials of HDM05 and UTKinect, of people left out,
-mirrored, with the arms exchanged, and backwards. Then how many right trials are accepted by what
-learnt from few or many. Prints Markdown.
+of the tests were chosen. *Sides*: trials of HDM05 and UTKinect, of people left out, mirrored, with
+the arms exchanged, and backwards. Prints Markdown.
 """
 
-import os
-import sys
 import warnings
-
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
-
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-from accuracy import print_head, print_row
-from negatives import as_clips, backwards
+from harness import command_line, print_head, print_row, run_tables
 from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -40,6 +30,8 @@ from sklearn_motionsync import (
 from sklearn_motionsync.body.limbs import PARTS
 from sklearn_motionsync.body.mirror import exchange_of_sides
 from sklearn_motionsync.datasets import load_performances
+
+from model import BACKWARDS, SPOILT, as_clips
 
 P, N_OWN = 60, 3
 LANDMARKS = {
@@ -148,17 +140,17 @@ def right_or_wrong(folder):
 # -- the wrong side, and the way back -----------------------------------------------------
 
 
-def exchanged(columns, signs, x):
-    return signs * x[:, columns]
+def exchange(columns, signs):
+    return lambda x: signs * x[:, columns]
 
 
 def wrong_sides(clips, names):
     """Of every action: right ones accepted, their images and other actions refused."""
     arms = PARTS["left arm"] + PARTS["right arm"]
     images = {
-        "mirrored": partial(exchanged, *exchange_of_sides(names)),
-        "arms exchanged": partial(exchanged, *exchange_of_sides(names, arms)),
-        "backwards": backwards,
+        "mirrored": exchange(*exchange_of_sides(names)),
+        "arms exchanged": exchange(*exchange_of_sides(names, arms)),
+        BACKWARDS: SPOILT[BACKWARDS],
     }
     print_head(f"{clips.name}: accepted / refused", ["right", *images, "other actions", "images"])
     for action in dict.fromkeys(clips.actions):
@@ -180,32 +172,13 @@ def wrong_sides(clips, names):
 # -- few and many -------------------------------------------------------------------------
 
 
-def learnt_from(folder, sizes=(5, 10, 20, 40)):
-    print_head("right trials accepted, learnt from", [*map(str, sizes)])
-    rng = np.random.default_rng(0)
-    accepted = {name: {n: [] for n in sizes} for name in ("`ActionModel`", "`ActionDetector`")}
-    for _, trials, people, right, _ in read_exercises(folder):
-        for person in np.unique(people):
-            others = np.flatnonzero((people != person) & right)
-            own = [trials[i] for i in np.flatnonzero((people == person) & right)]
-            for n in sizes:
-                known = rng.permutation(others)[:n]
-                given = [trials[i] for i in known], people[known], [], own
-                for name, way in zip(accepted, (by_model, by_detector), strict=True):
-                    accepted[name][n].extend(way(*given) <= 0)
-    for name, of_sizes in accepted.items():
-        print_row(name, [f"{100 * np.mean(values):.1f}" for values in of_sizes.values()])
-
-
-def main(folder):
-    warnings.simplefilter("ignore")
-    right_or_wrong(folder)
+def sides(folder):
     for archive, name in (("hdm05", "HDM05"), ("utkinect", "UTKinect")):
-        bunch = load_performances(Path(folder) / archive / f"{archive}_positions.npz")
+        bunch = load_performances(folder / archive / f"{archive}_positions.npz")
         names = DirectionCosines(bunch.skeleton).fit(bunch.data).get_feature_names_out()
         wrong_sides(as_clips(name, bunch), names)
-    learnt_from(folder)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    warnings.simplefilter("ignore")
+    run_tables({"right-or-wrong": right_or_wrong, "sides": sides}, command_line(__doc__))

@@ -4,7 +4,7 @@
 
 DATA is the folder with hdm05/ and utkinect/. Every action is matched to so many of its clips, by
 default 4, with so many draws of the gaps, by default 1: that takes three minutes. Gaps are cut into
-the joint positions of the clips of events.py that have a peer. The true moments come from the
+the joint positions of the clips of harness.py that have a peer. The true moments come from the
 positions without gaps. Three kinds:
 
 - limb: an arm or a leg is hidden for a second in 30 % of the clips, for half of a shorter clip;
@@ -23,8 +23,7 @@ import warnings
 
 import numpy as np
 import pandas as pd
-from events import EVENTS, P, read_actions
-from people import Judged, People, figures, geometric_means
+from harness import EVENTS, Judged, P, People, figures, geometric_means, read_actions
 from scipy.interpolate import CubicSpline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.io import fill_gaps

@@ -29,7 +29,7 @@ from pathlib import Path
 import exercises
 import numpy as np
 import trackers
-from events import P, read_archive
+from harness import P, read_archive
 from hidden_limbs import PEERS, STEP, Fitted, choose
 from sklearn_motionsync import DirectionCosines, JointNoise, MotionTracker, Skeleton
 from sklearn_motionsync.datasets import load_performances

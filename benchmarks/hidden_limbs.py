@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import trackers
-from events import P, read_archive
+from harness import P, read_archive
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, MotionTracker
 
 KINDS = ("half", "gap", "halfgap")

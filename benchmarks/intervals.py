@@ -3,7 +3,7 @@
     pip install .
     python benchmarks/intervals.py DATA_FOLDER
 
-The key moments of events.py, on people that had no part in the fit; the moment of the pattern is to
+The key moments of harness.py, on people that had no part in the fit; the moment of the pattern is to
 lie inside the interval of each clip. Then trials that are wrong (repeated, cut off, backwards, held
 still, of another action) among trials that are right, known warps, what departures and bands make
 of intervals, and the time they take. Prints Markdown.
@@ -16,9 +16,8 @@ from functools import partial
 
 import numpy as np
 from accuracy import CELLS, known_warps
-from events import EVENTS, THROW, P
+from harness import EVENTS, THROW, P, fewer_clips, read_people
 from joblib import Parallel, delayed
-from people import fewer_clips, read_people
 from scipy.stats import spearmanr
 from sklearn.model_selection import GroupKFold
 from sklearn.pipeline import make_pipeline

@@ -2,7 +2,7 @@
 
     python benchmarks/keyframes.py DATA_FOLDER [given] [few] [wrong]
 
-``given``: of every two moments of an action (events.py) one is given, and the error of the other is
+``given``: of every two moments of an action (harness.py) one is given, and the error of the other is
 judged on the pairs of clips that show both; with people who had no part in the fit, too. ``few``: a
 fifth of the clips have the moment, and it is judged in the others. ``wrong``: in one clip of five
 the moment that is given is wrong by a tenth of the clip. Errors are in frames of 100, mean and
@@ -12,8 +12,7 @@ median. Prints Markdown.
 import sys
 
 import numpy as np
-from events import EVENTS, P
-from people import FLOOR, FOLDS, read_people
+from harness import EVENTS, FLOOR, FOLDS, P, read_people
 from sklearn.model_selection import GroupKFold
 from sklearn_motionsync import ASpace, DenseSynchronizer, KeyframeSynchronizer
 

@@ -7,7 +7,7 @@ The reference is the phase of a whole clip, ``DenseSynchronizer(n_frames=100).ma
 the other way round. Errors are in frames of 100, of all frames after the first fifth of a clip, up
 to its last. Takes ten minutes.
 
-1. Phase, median and 90 % quantile of an action.    2. Key moments, those of events.py.
+1. Phase, median and 90 % quantile of an action.    2. Key moments, those of harness.py.
 3. No look-ahead.    4. Speed.    5. Other frame rates, hidden features, frames that are missing.
 6. What is no such movement; who waits or stops.    7. Time to finish.
 """
@@ -21,7 +21,7 @@ import argparse
 import time
 
 import numpy as np
-from events import EVENTS, P, read_actions
+from harness import EVENTS, P, read_actions
 from live_peers import PEERS, sampled
 from live_people import held_out
 from sklearn.metrics import roc_auc_score

@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 from cycles import foot_strikes, read
-from events import EVENTS, P, read_actions
+from harness import EVENTS, P, read_actions
 from live import ARCHIVES
 from live_people import held_out, phase_of
 from sklearn_motionsync import (

@@ -19,7 +19,7 @@ import warnings
 from typing import NamedTuple
 
 import numpy as np
-from events import EVENTS, P, read_actions
+from harness import EVENTS, P, read_actions
 from live_people import held_out, truth_of
 from sklearn_motionsync import DenseSynchronizer, OnlineSynchronizer
 from sklearn_motionsync.online.stream import Streams

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from events import P
+from harness import P
 from live_peers import Known
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, OnlineSynchronizer
@@ -19,7 +19,7 @@ class Fold:
     """What is known of an action from all actors but one, and the clips of that one.
 
     ``truths``: the phases of the frames of each clip. ``moments`` {event: (n_clips,)}: when the
-    clips show the events of events.py. ``landed`` {event: phase}: where the pattern has them.
+    clips show the events of harness.py. ``landed`` {event: phase}: where the pattern has them.
     ``wrong``: what the same actor does otherwise. ``positions``: the joints of the clips.
     ``points``: makes features of joint positions, ``names`` are theirs.
     """

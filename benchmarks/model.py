@@ -1,56 +1,178 @@
-"""What action models accept and refuse: people held out, against other packages' detectors.
+"""What action models and detectors accept and refuse: people held out.
 
-    pip install . dtaidistance
     python benchmarks/model.py DATA_FOLDER
 
-DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form; without it
-only the synthetic bends of make_bending are run. Every actor is held out in turn, and everything is
+DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form. A model
+that can say no accepts what people it has not seen do (`OWN`) and refuses what is not the action
+(`KINDS`): the other actions of the same people, and their own performances spoilt in six ways
+(`SPOILT`), all made of points of the aSpace. Every actor is held out in turn, and everything is
 learnt from the others: aSpace, synchronizer, model, border. Walking cycles are one person's, so a
-take of them stands for an actor. Shares are in percent, means over actions. Detectors of other
-packages are shown at the best of a few settings (judges.py), chosen by the result: the largest mean
-area under the curve on that data set. Prints Markdown.
+take of them stands for an actor. Shares are in percent, means over actions. Prints Markdown.
 """
 
-import sys
-import time
-from pathlib import Path
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from accuracy import print_head, print_row
-from events import P
+from harness import P, command_line, percent, print_head, print_row, print_versions, read_archive
 from joblib import Parallel, delayed
-from judges import DETECTOR, MODEL, PEERS, judges, version_of
-from negatives import (
-    BACKWARDS,
-    BENDS,
-    KINDS,
-    OTHERS,
-    OWN,
-    SPOILT,
-    THERE_AND_BACK,
-    hold_out,
-    hold_out_few,
-    read_clips,
-)
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
+    ActionDetector,
     ActionModel,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    Skeleton,
-    find_departures,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import make_bending
 
 NOMINAL = (0.80, 0.90, 0.95, 0.99)
 # The last is that of three standard deviations.
 HELD = (*NOMINAL, 0.9973)
 FEW, DRAWS = (5, 10, 20), 2
-REACHED = [(n, given) for n in ("all", *FEW) for given in (True, False)]
+
+# -- wrong performances -----------------------------------------------------------------
+
+
+OWN, OTHERS, BACKWARDS = "own", "other actions", "backwards"
+SPOILT = {
+    "standing still": lambda x: np.repeat(x[:1], len(x), axis=0),
+    "amplitude x 0.3": lambda x: x.mean(axis=0) + 0.3 * (x - x.mean(axis=0)),
+    "first half": lambda x: x[: max(len(x) // 2, 3)],
+    "twice in a row": lambda x: np.concatenate([x, x]),
+    "halves exchanged": lambda x: np.roll(x, -(len(x) // 2), axis=0),
+    BACKWARDS: lambda x: x[::-1].copy(),
+}
+KINDS = (OTHERS, *SPOILT)
+# Bent down and up again is, backwards, nearly the same; and so is whatever returns as it went.
+BENDS = ("depositFloorR", "bending")
+THERE_AND_BACK = (*BENDS, "elbowToKnee1RepsLelbowStart", "grabHighR", "hopBothLegs1hops")
+THERE_AND_BACK += ("pickUp", "waveHands", "clapHands")
+
+# -- the data sets ----------------------------------------------------------------------
+
+
+class Clips(NamedTuple):
+    """Postures (n_frames_i, 37) of a data set, what is done in them, and by whom."""
+
+    name: str
+    postures: list
+    actions: np.ndarray
+    actors: np.ndarray
+
+    def folds(self):
+        """Every action with every actor who does it."""
+        return list(dict.fromkeys(zip(self.actions, self.actors, strict=True)))
+
+    def some(self, which):
+        """The postures of those that are chosen by a mask."""
+        return [self.postures[i] for i in np.flatnonzero(which)]
+
+
+ARCHIVES = {"hdm05": "HDM05", "utkinect": "UTKinect", "cmu07_walk": "CMU, walking cycles"}
+
+
+def read_clips(folder=None):
+    """The data sets: three of real people, if there is a folder of them, and make_bending."""
+    archives = {} if folder is None else ARCHIVES
+    sets = [as_clips(name, read_archive(folder, archive)) for archive, name in archives.items()]
+    return [*sets, as_clips("make_bending", make_bending(random_state=0))]
+
+
+def as_clips(name, bunch):
+    postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    return Clips(name, list(postures), np.asarray(bunch.target), np.asarray(bunch.actor))
+
+
+# -- actors held out --------------------------------------------------------------------
+
+
+class Fold(NamedTuple):
+    """An action, learnt from some actors and tried on another.
+
+    ``raw`` and ``synchronised`` hold by kind what is tried, points (n_frames_i, b) of the aSpace
+    and (n, P, b) on the clock of the training performances; kinds that are empty are left out.
+    """
+
+    clips: str
+    action: str
+    actor: object
+    train: list
+    groups: np.ndarray
+    on_clock: np.ndarray
+    raw: dict
+    synchronised: dict
+
+
+def hold_out(clips, action, actor):
+    """Everything learnt without an actor: aSpace, synchronizer; then the actor's performances."""
+    does_it, is_held = clips.actions == action, clips.actors == actor
+    train = np.flatnonzero(does_it & ~is_held)
+    space = ASpace().fit(clips.some(does_it & ~is_held))
+    raw = {OWN: _points(space, clips, does_it & is_held)}
+    raw[OTHERS] = _points(space, clips, ~does_it & is_held)
+    raw |= {kind: [spoil(x) for x in raw[OWN]] for kind, spoil in SPOILT.items()}
+    raw = {kind: some for kind, some in raw.items() if some}
+    known = _points(space, clips, does_it & ~is_held)
+    synchronizer = DenseSynchronizer(P)
+    on_clock = synchronizer.fit_transform(known)
+    synchronised = {kind: synchronizer.transform(some) for kind, some in raw.items()}
+    return Fold(clips.name, action, actor, known, clips.actors[train], on_clock, raw, synchronised)
+
+
+def hold_out_few(clips, action, actor, n_performances, rng):
+    """The same from a few training performances, of two actors at least, and right ones only.
+
+    Returns these on their clock, their groups, and the actor's own; None if there are not so many.
+    """
+    does_it, is_held = clips.actions == action, clips.actors == actor
+    train = np.flatnonzero(does_it & ~is_held)
+    if len(train) < n_performances or len(set(clips.actors[train])) < 2:
+        return None
+    while True:
+        chosen = np.sort(rng.permutation(train)[:n_performances])
+        if len(set(clips.actors[chosen])) > 1:
+            break
+    space = ASpace().fit([clips.postures[i] for i in chosen])
+    synchronizer = DenseSynchronizer(P)
+    on_clock = synchronizer.fit_transform([*space.transform([clips.postures[i] for i in chosen])])
+    own = synchronizer.transform(_points(space, clips, does_it & is_held))
+    return on_clock, clips.actors[chosen], own
+
+
+def _points(space, clips, which):
+    chosen = clips.some(which)
+    return list(space.transform(chosen)) if chosen else []
+
+
+# -- who judges: decisions by kind, below 0 outside -------------------------------------
+
+MODEL, DETECTOR = "`ActionModel`", "`ActionDetector`"
+
+
+def density(fold):
+    """A root-mean-square deviation of at most three standard deviations."""
+    model = ActionModel(n_std=3.0).fit(fold.on_clock)
+    most = model.score_samples(model.mean_[np.newaxis])
+    squares = {
+        kind: 2 * (most - model.score_samples(X)) / model.mean_.size
+        for kind, X in fold.synchronised.items()
+    }
+    return {kind: model.n_std - np.sqrt(np.maximum(each, 0)) for kind, each in squares.items()}
+
+
+def verdicts_on(fold):
+    """{judge: {kind: decisions}}"""
+    model = ActionModel().fit(fold.on_clock, groups=fold.groups)
+    verdicts = {"the density, 3 standard deviations": density(fold)}
+    verdicts[MODEL] = {kind: model.decision_function(X) for kind, X in fold.synchronised.items()}
+    for name, duration in (("`ActionDetector(duration=False)`", False), (DETECTOR, True)):
+        pipe = make_pipeline(DenseSynchronizer(P), ActionModel())
+        detector = ActionDetector(pipe, duration=duration).fit(fold.train, groups=fold.groups)
+        verdicts[name] = {kind: detector.decision_function(X) for kind, X in fold.raw.items()}
+    return verdicts
 
 
 # -- what is found on a fold ------------------------------------------------------------
@@ -59,36 +181,27 @@ REACHED = [(n, given) for n in ("all", *FEW) for given in (True, False)]
 class Found(NamedTuple):
     """Of one action and actor.
 
-    verdicts : {judge: {setting: {kind: decisions}}}
+    verdicts : {judge: {kind: decisions}}
     reached : {(training performances, groups given): accepted (n, nominal)}
     held : {band: shares of points held, and whether all (n, nominal, 2)}
-    border : float
-    reversal : dissimilarities of the right performances to themselves backwards
     """
 
     action: str
     verdicts: dict
     reached: dict
     held: dict
-    border: float
-    reversal: np.ndarray
 
 
 def examine(clips, action, actor):
     """Everything that is measured on a fold."""
     fold = hold_out(clips, action, actor)
-    own, groups = fold.synchronised[OWN], fold.groups
-    verdicts = {name: judge(fold) for name, judge in judges().items()}
-    reached = accepted_at(fold.on_clock, groups, own, "all")
+    reached = accepted_at(fold.on_clock, fold.groups, fold.synchronised[OWN], "all")
     rng = np.random.default_rng(0)
     for n in FEW:
         drawn = [hold_out_few(clips, action, actor, n, rng) for _ in range(DRAWS)]
         for known in filter(None, drawn):
             reached = joined(reached, accepted_at(*known, n))
-    border = ActionModel().fit(fold.on_clock, groups=groups).threshold_
-    pairs = zip(own, fold.synchronised[BACKWARDS], strict=True)
-    reversal = np.array([unlikeness(*pair) for pair in pairs])
-    return Found(action, verdicts, reached, held_by(fold), border, reversal)
+    return Found(action, verdicts_on(fold), reached, held_by(fold))
 
 
 def accepted_at(on_clock, groups, own, label):
@@ -121,16 +234,6 @@ def held(bounds, fold):
     return np.column_stack([inside.mean(axis=(1, 2)), inside.all(axis=(1, 2))])
 
 
-def unlikeness(x, y):
-    """How unlike two performances (P, b) are to the model: 0 equal, 1 one of them stands still."""
-    both = [(z - z.mean(axis=0), np.gradient(z, axis=0)) for z in (x, y)]
-    ratios = [
-        np.square(a - b).sum() / (np.square(a).sum() + np.square(b).sum())
-        for a, b in zip(*both, strict=True)
-    ]
-    return np.mean(ratios)
-
-
 def joined(one, other):
     """Dicts of arrays, those under one key one after the other."""
     both = dict(one)
@@ -142,11 +245,11 @@ def joined(one, other):
 # -- figures ----------------------------------------------------------------------------
 
 
-def pooled(found, judge, setting):
+def pooled(found, judge):
     """Decisions of a judge over all actors: {action: {kind: decisions}}."""
     actions: dict = {}
     for one in found:
-        actions[one.action] = joined(actions.get(one.action, {}), one.verdicts[judge][setting])
+        actions[one.action] = joined(actions.get(one.action, {}), one.verdicts[judge])
     return actions
 
 
@@ -170,17 +273,6 @@ def mean(values):
     return np.mean(values, axis=0) if values else np.nan
 
 
-def mean_areas(actions):
-    """Of every kind, the mean over actions; NaN where no action has that kind."""
-    return np.array([mean(areas(actions, kind)) for kind in KINDS])
-
-
-def best_setting(found, judge):
-    """The setting with the largest mean area under the curve."""
-    settings = found[0].verdicts[judge]
-    return max(settings, key=lambda s: np.nanmean(mean_areas(pooled(found, judge, s))))
-
-
 def refused(actions, kind, apart=()):
     """Share of a kind that is refused, mean over actions but for some."""
     return 1 - mean(share for name, share in accepted(actions, kind).items() if name not in apart)
@@ -189,66 +281,42 @@ def refused(actions, kind, apart=()):
 # -- tables -----------------------------------------------------------------------------
 
 
-def percent(share):
-    return "-" if np.isnan(share) else f"{100 * share:.0f}"
-
-
-def two_digits(value):
-    return "-" if np.isnan(value) else f"{value:.2f}"
-
-
 def verdict_tables(name, found):
     """What is accepted and refused, and the areas under the curves, of every judge."""
-    best = {judge: best_setting(found, judge) for judge in found[0].verdicts}
-    decided = {
-        f"{judge}, {setting}" if setting else judge: pooled(found, judge, setting)
-        for judge, setting in best.items()
-    }
     header = ["own", "lowest action", *KINDS]
     header += [f"{BACKWARDS}, {some}" for some in ("without bends", "one-way actions")]
+    decided = {judge: pooled(found, judge) for judge in found[0].verdicts}
     print_head(f"{name}: accepted / refused", header)
-    for label, actions in decided.items():
+    for judge, actions in decided.items():
         own = list(accepted(actions).values())
-        cells = [np.mean(own), min(own)]
-        cells += [refused(actions, kind) for kind in KINDS]
+        cells = [np.mean(own), min(own), *(refused(actions, kind) for kind in KINDS)]
         cells += [refused(actions, BACKWARDS, apart) for apart in (BENDS, THERE_AND_BACK)]
-        print_row(label, map(percent, cells))
+        print_row(judge, map(percent, cells))
     print_head(f"{name}: area under the curve", [*KINDS, "mean"])
-    areas_of = {label: mean_areas(actions) for label, actions in decided.items()}
-    every = [
-        mean_areas(pooled(found, judge, setting))
-        for judge in PEERS.keys() & best.keys()
-        for setting in found[0].verdicts[judge]
-    ]
-    areas_of["*the best of others' settings, every number by itself*"] = np.max(every, axis=0)
-    for label, of_kinds in areas_of.items():
-        print_row(label, map(two_digits, [*of_kinds, np.nanmean(of_kinds)]))
+    for judge, actions in decided.items():
+        of_kinds = np.array([mean(areas(actions, kind)) for kind in KINDS])
+        cells = [*of_kinds, np.nanmean(of_kinds)]
+        print_row(judge, ["-" if np.isnan(x) else f"{x:.2f}" for x in cells])
 
 
 def action_table(found_by_set, judge):
-    """What a judge of ours accepts and refuses, action by action."""
-    header = ["trials", "own", *KINDS, "threshold", "dissimilarity to itself backwards"]
-    print_head(f"{judge}: accepted / refused", header)
+    """What a judge accepts and refuses, action by action."""
+    print_head(f"{judge}: accepted / refused", ["trials", "own", *KINDS])
     for name, found in found_by_set.items():
-        for action, by in pooled(found, judge, "").items():
-            folds = [one for one in found if one.action == action]
+        for action, by in pooled(found, judge).items():
             shares = [np.mean(by[OWN] >= 0), *(refused({action: by}, kind) for kind in KINDS)]
-            borders = [one.border for one in folds]
-            cells = [str(len(by[OWN])), *map(percent, shares)]
-            cells += [f"{min(borders):.2f} to {max(borders):.2f}"]
-            cells += [two_digits(np.median(np.concatenate([one.reversal for one in folds])))]
-            print_row(f"{name}, `{action}`", cells)
+            print_row(f"{name}, `{action}`", [str(len(by[OWN])), *map(percent, shares)])
 
 
 def border_table(found_by_set):
     """The share of right performances that is accepted, beside what was asked for."""
     print_head("accepted, nominal share", ["actions", *(f"{c:.0%}" for c in NOMINAL)])
     for name, found in found_by_set.items():
-        for key in REACHED:
+        for key in product(("all", *FEW), (True, False)):
             shares, n_actions = by_action(found, lambda one, key=key: one.reached.get(key))
             if n_actions:
                 label = f"{name}, {key[0]} trials, {'groups given' if key[1] else 'no groups'}"
-                print_row(label, [str(n_actions), *map(one_digit, shares)])
+                print_row(label, [str(n_actions), *(percent(x, 1) for x in shares)])
 
 
 def band_table(found_by_set):
@@ -258,7 +326,7 @@ def band_table(found_by_set):
     for name, found in found_by_set.items():
         for band in found[0].held:
             shares, _ = by_action(found, lambda one, band=band: one.held[band])
-            print_row(f'{name}, `band="{band}"`', map(one_digit, shares.T.ravel()))
+            print_row(f'{name}, `band="{band}"`', [percent(x, 1) for x in shares.T.ravel()])
 
 
 def by_action(found, rows_of):
@@ -269,159 +337,6 @@ def by_action(found, rows_of):
         if rows is not None:
             actions.setdefault(one.action, []).extend(rows)
     return mean(np.mean(rows, axis=0) for rows in actions.values()), len(actions)
-
-
-def one_digit(share):
-    return f"{100 * share:.1f}"
-
-
-# -- departures -------------------------------------------------------------------------
-
-
-def departures_of(clips, action, actor):
-    """How right and refused performances of an actor held out depart, in whole postures.
-
-    {kind: (n, 3) whether it departs, whether rarely, number of departures}
-    """
-    does_it, is_held = clips.actions == action, clips.actors == actor
-    pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
-    known = does_it & ~is_held
-    pipe.fit(clips.some(known), actionmodel__groups=clips.actors[known])
-    right = clips.some(does_it & is_held)
-    tried = {OWN: right, OTHERS: clips.some(~does_it & is_held)}
-    tried |= {kind: [spoil(x) for x in right] for kind, spoil in SPOILT.items()}
-    found = {}
-    for kind, some in tried.items():
-        if kind != OWN and some:
-            some = [x for x, verdict in zip(some, pipe.predict(some), strict=True) if verdict < 0]
-        if some:
-            found[kind] = counted(find_departures(pipe, some), len(some))
-    return found
-
-
-def counted(table, n):
-    """(n, 3) of performances: any departure, any rare one, how many."""
-    counts = np.bincount(table["performance"].astype(int), minlength=n)
-    rare = np.bincount(table["performance"][table["rare"]].astype(int), minlength=n)
-    return np.column_stack([counts > 0, rare > 0, counts])
-
-
-def departure_table(sets):
-    """Of right performances, accepted or not, and of those of other kinds that are refused."""
-    header = ["trials", "with a departure", "with a rare one", "departures each"]
-    print_head("departures of whole poses", header)
-    for clips in sets:
-        work = [delayed(departures_of)(clips, *fold) for fold in clips.folds()]
-        found: dict = {}
-        for one in Parallel(n_jobs=-1)(work):
-            found = joined(found, one)
-        for kind in (k for k in (OWN, *KINDS) if k in found):
-            any_, rare, counts = found[kind].T
-            cells = [str(len(counts)), percent(any_.mean()), percent(rare.mean())]
-            which = "right" if kind == OWN else f"{kind}, refused"
-            print_row(f"{clips.name}, {which}", [*cells, f"{counts.mean():.1f}"])
-
-
-# -- sampled feet -----------------------------------------------------------------------
-
-SAMPLES = 200
-
-
-def feet_table(folder):
-    """How far sampled bends have their feet under the floor of the mean performance."""
-    bunch = load_performances(Path(folder) / "hdm05" / "hdm05_positions.npz")
-    chosen = np.flatnonzero(bunch.target == BENDS[0])
-    steps = (DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer())
-    pipe = make_pipeline(*steps, ActionModel())
-    data, actors = [bunch.data[i] for i in chosen], bunch.actor[chosen]
-    model = pipe.fit(data, actionmodel__groups=actors)[-1]
-    on_clock = np.asarray(pipe[:-1].transform(data))
-    ankles = [Skeleton.paper().index_of(side + "_ankle") for side in ("left", "right")]
-    rng = np.random.RandomState(0)
-    drawn = {
-        "training trials": lambda frame: on_clock[:, frame],
-        "every feature by itself": lambda frame: by_feature(model, frame, rng),
-        "`sample(200, frame)`": lambda frame: model.sample(SAMPLES, frame=frame, random_state=rng),
-    }
-    low = ["lowest foot, cm", "lowest joint, cm"]
-    deep = ["with a foot more than 10 cm under", "with any joint more than 10 cm under"]
-    print_head(f"`{BENDS[0]}`, all frames", [*low, *deep])
-    for label, postures in drawn.items():
-        heights = np.concatenate(
-            [above_floor(pipe[:2], model.mean_, postures(t)) for t in range(len(model.mean_))]
-        )
-        of_feet = heights[:, ankles]
-        cells = [f"{100 * some.min():.0f}" for some in (of_feet, heights)]
-        cells += [f"{np.mean(some.min(axis=1) < -0.1):.1%}" for some in (of_feet, heights)]
-        print_row(label, cells)
-
-
-def by_feature(model, frame, rng):
-    """Normal distributions cut off at the envelope, each feature by itself."""
-    shape = (SAMPLES, model.mean_.shape[1])
-    z = ndtri(rng.uniform(ndtr(-model.n_std), ndtr(model.n_std), shape))
-    return model.mean_[frame] + z * np.sqrt(model.variance_[frame])
-
-
-def above_floor(space, mean_performance, postures):
-    """Heights (n, 15) of joints above the lowest that the mean performance reaches, in metres.
-
-    Postures do not tell how far the hips are below the pelvis, and bodies that are built together
-    have their legs moved until the lowest ankle is on the floor: here they hang as in the mean.
-    """
-
-    def heights(points):
-        return np.asarray(space.inverse_transform(points)).reshape(len(points), -1, 3)[..., 1]
-
-    def drop(found):
-        return (
-            found[:, of("hip")].mean(axis=1, keepdims=True) - found[:, [paper.index_of("pelvis")]]
-        )
-
-    def of(joint):
-        return [paper.index_of(f"{side}_{joint}") for side in ("left", "right")]
-
-    paper, mean = Skeleton.paper(), heights(mean_performance)
-    found = heights(postures)
-    found[:, [*of("hip"), *of("knee"), *of("ankle")]] -= drop(found) - drop(mean).mean()
-    return found - mean.min()
-
-
-# -- time -------------------------------------------------------------------------------
-
-REPETITIONS = 50
-
-
-def time_table(folds):
-    """predict over score_samples, in alternation."""
-    print_head("time of `predict` / of the density", ["trials", "together", "alone"])
-    for fold in folds:
-        model = ActionModel().fit(fold.on_clock, groups=fold.groups)
-        tried = np.concatenate(list(fold.synchronised.values()))
-        cells = [str(len(tried))]
-        for X in (tried, tried[:1]):
-            seconds = np.array(
-                [
-                    [took(f, X) for f in (model.predict, model.score_samples)]
-                    for _ in range(REPETITIONS)
-                ]
-            )
-            cells.append("{:.2f} / {:.2f} ms = {:.1f}".format(*ratio(seconds)))
-        print_row(f"{fold.clips}, `{fold.action}`, {len(fold.on_clock)} learnt", cells)
-
-
-def took(function, X):
-    start = time.perf_counter()
-    function(X)
-    return time.perf_counter() - start
-
-
-def ratio(seconds):
-    ours, other = np.median(seconds, axis=0)
-    return 1e3 * ours, 1e3 * other, ours / other
-
-
-# -- all of it --------------------------------------------------------------------------
 
 
 def examine_all(sets):
@@ -439,20 +354,9 @@ def print_tables(sets):
         action_table(found_by_set, judge)
     border_table(found_by_set)
     band_table(found_by_set)
-    departure_table(sets)
-    time_table([hold_out(clips, *clips.folds()[0]) for clips in sets])
-
-
-def main():
-    """Print the tables."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
-    packages = ("sklearn_motionsync", "numpy", "scipy", "scikit-learn", "dtaidistance")
-    versions = {package: version_of(package) for package in packages}
-    print(", ".join(f"{name} {version or 'not installed'}" for name, version in versions.items()))
-    print_tables(read_clips(folder))
-    if folder is not None:
-        feet_table(folder)
 
 
 if __name__ == "__main__":
-    main()
+    folder = command_line(__doc__).parse_args().folder
+    print_versions("scipy", "scikit-learn")
+    print_tables(read_clips(folder))

@@ -8,10 +8,10 @@ mean that they find themselves, ``(n, P)``.
 """
 
 import contextlib
-import importlib.metadata
 import os
 
 import numpy as np
+from harness import version_of
 
 
 def _from_pairs(pairs, n_frames):
@@ -231,10 +231,7 @@ def leave_out():
 
 def installed(label):
     """The version of a peer, or None."""
-    try:
-        return importlib.metadata.version((PEERS | TIME_LINES)[label][0])
-    except importlib.metadata.PackageNotFoundError:
-        return None
+    return version_of((PEERS | TIME_LINES)[label][0])
 
 
 def settings(label):

@@ -1,54 +1,306 @@
-"""Which action it is, of people not seen: the classifier, and other packages' and other ways.
+"""Which action it is, of people not seen: the classifier, and other ways.
 
-    pip install . aeon dtaidistance
-    python benchmarks/recognition.py DATA_FOLDER [TABLES ...]
+    pip install . aeon
+    python benchmarks/recognition.py DATA_FOLDER [actions] [rejected] [exercises]
 
-TABLES are some of actions, rejected, exercises and times; without them all are printed.
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect of the same form, with
 utkinect/utkinect_splits.json: ten halves of the actors to learn from, on which published results
-stand; and uiprmd/uiprmd_odd_positions.npz, exercises done right and wrong.
-Nothing of `ActionClassifier` is chosen here. Of every other way the best setting is shown,
-chosen by the result: view (cosines, positions or both), length and scale with the largest
-accuracy; and in a row of its own the best that any of their settings reaches, every number by
-itself. Probabilities of theirs have one temperature, learnt of training actors left out in turn.
-Unknown actions are left out of the training in turn: the area under the curve of the novelty of
-all test clips (theirs: minus the largest score), mean over splits and actions.
-Exercises are told right from wrong, of one subject after the other, by all trials of the others or
-by every second: the area under the curve of all subjects together. Prints Markdown.
+stand; and uiprmd/uiprmd_odd_positions.npz, exercises done right and wrong. Nothing of
+`ActionClassifier` is chosen here. Of every other way the best setting is shown, chosen by the
+result: view (cosines, positions or both), length and scale with the largest accuracy; and in a row
+of its own the best that any of their settings reaches, every number by itself. Ways of packages
+that are not installed are left out. Unknown actions are left out of the training in turn: the area
+under the curve of the novelty of all test clips, mean over splits and actions. Exercises are told
+right from wrong, of one subject after the other, by all trials of the others or by every second:
+the area under the curve of all subjects together. Prints Markdown.
+
+A recognizer is bound to recordings and takes indices of them: what it learns from, and what it is
+asked about. Other ways are functions ``decide(train, test)`` that give classes and scores
+(n_test, n_classes), the larger the more like the class; `Scored` makes probabilities of scores
+with one temperature, learnt of people left out, and calls new what has no large score.
 """
 
 import json
 import re
-import sys
-import time
 import warnings
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from accuracy import print_head, print_row
 from exercises import read_exercises
-from joblib import Parallel, delayed
-from judges import version_of
-from negatives import SPOILT
-from recognizers import (
-    BOTH,
-    CLASSIFIER,
-    COSINES,
-    ROCKET,
-    Classifier,
-    Recordings,
-    as_recordings,
-    classifier,
-    on_clock,
-    rocket,
-    ways,
+from harness import (
+    command_line,
+    percent,
+    print_head,
+    print_row,
+    print_versions,
+    run_tables,
+    version_of,
 )
+from joblib import Parallel, delayed
+from scipy.optimize import minimize_scalar
+from scipy.special import log_softmax, softmax
+from sklearn.linear_model import RidgeClassifierCV
 from sklearn.metrics import roc_auc_score
 from sklearn.model_selection import LeaveOneGroupOut
-from sklearn_motionsync import synchronization_distances
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVC
+from sklearn_motionsync import (
+    ActionClassifier,
+    DirectionCosines,
+    JointPositions,
+    LinearSynchronizer,
+)
 from sklearn_motionsync.datasets import load_performances
-from threadpoolctl import threadpool_limits
+
+from model import SPOILT
+
+# -- recordings -------------------------------------------------------------------------
+
+COSINES, POSITIONS, BOTH = VIEWS = ("cosines", "positions", "cosines + positions")
+
+
+class Recordings(NamedTuple):
+    """Performances (n_frames_i, n_features) by view, what is done in them, and by whom."""
+
+    name: str
+    views: dict
+    actions: np.ndarray
+    actors: np.ndarray
+
+    def some(self, view, chosen):
+        """The performances of some indices."""
+        return [self.views[view][i] for i in chosen]
+
+
+def as_recordings(name, bunch):
+    """Every posture as 37 cosines, as 14 joints seen from the pelvis, and as both in a row."""
+    cosines = list(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
+    positions = list(JointPositions(bunch.skeleton).fit_transform(bunch.data))
+    both = [np.hstack(pair) for pair in zip(cosines, positions, strict=True)]
+    views = dict(zip(VIEWS, (cosines, positions, both), strict=True))
+    return Recordings(name, views, np.asarray(bunch.target), np.asarray(bunch.actor))
+
+
+def on_clock(recordings, view, n_frames):
+    """(n, n_frames, n_features), stretched to one length."""
+    return LinearSynchronizer(n_frames).fit_transform(recordings.views[view]).astype(float)
+
+
+# -- ours -------------------------------------------------------------------------------
+
+
+class Classifier:
+    """`ActionClassifier` with its defaults, which knows who performs what it learns from."""
+
+    def __init__(self, recordings, view):
+        self._recordings, self._view = recordings, view
+
+    def predict(self, train, test):
+        """Actions of performances (n_test,)."""
+        return self.learnt(train).predict(self._recordings.some(self._view, test))
+
+    def probabilities(self, train, test):
+        """Classes, and their probabilities (n_test, n_classes)."""
+        model = self.learnt(train)
+        return model.classes_, model.predict_proba(self._recordings.some(self._view, test))
+
+    def novelty(self, train, test):
+        """The larger, the less like any class (n_test,)."""
+        return -self.learnt(train).score_samples(self._recordings.some(self._view, test))
+
+    def contrast(self, train, test):
+        """The larger, the more like the second of two classes (n_test,)."""
+        return self.learnt(train).decision_function(self._recordings.some(self._view, test))
+
+    def learnt(self, train):
+        """The classifier of some of the recordings."""
+        actions, actors = self._recordings.actions[train], self._recordings.actors[train]
+        # Of one person alone it cannot learn how people differ.
+        groups = actors if len(set(actors)) > 1 else None
+        return ActionClassifier().fit(self._recordings.some(self._view, train), actions, groups)
+
+
+def classifier(recordings, view, n_frames):
+    return {CLASSIFIER: {"": Classifier(recordings, view)}}
+
+
+# -- scores, and what is made of them ---------------------------------------------------
+
+
+class Scored:
+    """A recognizer of a function ``decide(train, test)``: classes, scores (n_test, n_classes)."""
+
+    def __init__(self, recordings, decide):
+        self._actions, self._actors = recordings.actions, recordings.actors
+        self._decide = decide
+
+    def predict(self, train, test):
+        """Actions of performances (n_test,)."""
+        classes, scores = self._decide(train, test)
+        return classes[scores.argmax(axis=1)]
+
+    def probabilities(self, train, test):
+        """Classes, and their probabilities (n_test, n_classes)."""
+        classes, scores = self._decide(train, test)
+        return classes, softmax(self._slope(classes, train) * scores, axis=1)
+
+    def novelty(self, train, test):
+        """The larger, the less like any class (n_test,)."""
+        return -self._decide(train, test)[1].max(axis=1)
+
+    def contrast(self, train, test):
+        """The larger, the more like the second of two classes (n_test,)."""
+        return np.diff(self._decide(train, test)[1], axis=1)[:, 0]
+
+    def _slope(self, classes, train):
+        """Of everybody in the training set, when the others are learnt from."""
+        scores = np.full((len(train), len(classes)), np.nan)
+        for known, held in LeaveOneGroupOut().split(train, groups=self._actors[train]):
+            seen, found = self._decide(train[known], train[held])
+            scores[np.ix_(held, np.searchsorted(classes, seen))] = found
+        # What nobody else does is thought of last.
+        scores = np.where(np.isnan(scores), np.nanmin(scores), scores)
+        return slope_of(scores, np.searchsorted(classes, self._actions[train]))
+
+
+def slope_of(scores, targets):
+    """One over the temperature: the factor of scores (n, n_classes) with the least log-loss."""
+    below = scores - scores.max(axis=1, keepdims=True)
+    unit, rows = np.abs(below).mean(), np.arange(len(targets))
+
+    def loss(logarithm):
+        return -log_softmax(np.exp(logarithm) / unit * below, axis=1)[rows, targets].mean()
+
+    return np.exp(minimize_scalar(loss, bounds=(-7, 7), method="bounded").x) / unit
+
+
+# -- dynamic time warping ---------------------------------------------------------------
+
+# With 1 all are worse, by 1 to 4 in 100; with 100 as good.
+C = 10
+
+
+def dtw(recordings, view, n_frames):
+    """Nearest neighbours, and support vector machines on the kernel exp(-D / median D).
+
+    Distances are the roots of aeon's, which do better.
+    """
+    import aeon.distances
+
+    X = np.ascontiguousarray(on_clock(recordings, view, n_frames).transpose(0, 2, 1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        D = np.sqrt(aeon.distances.dtw_pairwise_distance(X))
+
+    def nearest(train, test):
+        labels, to_train = recordings.actions[train], D[np.ix_(test, train)]
+        each = [-to_train[:, labels == c].min(axis=1) for c in np.unique(labels)]
+        return np.unique(labels), np.stack(each, axis=1)
+
+    return {
+        NEAREST: {"": Scored(recordings, nearest)},
+        DTW_SVM: {"": machines(recordings, partial(kernel_of, D))},
+    }
+
+
+def kernel_of(D, train):
+    """exp(-D / median D) of all pairs (n, n), the median over pairs of the training set."""
+    pairs = np.triu_indices(len(train), 1)
+    return np.exp(-D / np.median(D[np.ix_(train, train)][pairs]))
+
+
+def machines(recordings, kernel):
+    """One support vector machine a class against the rest, on ``kernel(train)`` of all with all."""
+
+    def decide(train, test):
+        K, labels = kernel(train), recordings.actions[train]
+        among, to_train = K[np.ix_(train, train)], K[np.ix_(test, train)]
+        each = [
+            SVC(C=C, kernel="precomputed").fit(among, labels == k).decision_function(to_train)
+            for k in np.unique(labels)
+        ]
+        return np.unique(labels), np.stack(each, axis=1)
+
+    return Scored(recordings, decide)
+
+
+# -- what does not warp -----------------------------------------------------------------
+
+
+def pyramid(recordings, view, n_frames):
+    """A linear support vector machine on a Fourier temporal pyramid."""
+    X = fourier_pyramid(on_clock(recordings, view, n_frames))
+
+    def kernel(scaled, train):
+        Z = StandardScaler(with_std=scaled).fit(X[train]).transform(X)
+        return Z @ Z.T / np.square(Z[train]).sum(axis=1).mean()
+
+    settings = {"": False, "standardised": True}
+    return {PYRAMID: {k: machines(recordings, partial(kernel, v)) for k, v in settings.items()}}
+
+
+def fourier_pyramid(X, n_levels=3, n_frequencies=6):
+    """Amplitudes of the lowest frequencies of the whole, its halves, its quarters, and so on.
+
+    X is (n, P, n_features).
+    """
+    found = []
+    for level in range(n_levels):
+        for part in np.array_split(X, 2**level, axis=1):
+            waves = np.fft.rfft(part, axis=1)[:, :n_frequencies] / part.shape[1]
+            found.append(np.abs(waves).reshape(len(X), -1))
+    return np.concatenate(found, axis=1)
+
+
+def rocket(recordings, view, n_frames):
+    """Ridge regression on MiniRocket's features, as in aeon's classifier.
+
+    The thresholds of the features are those of all clips, the tested ones as well.
+    """
+    from aeon.transformations.collection.convolution_based import MiniRocket
+
+    X = np.ascontiguousarray(on_clock(recordings, view, n_frames).transpose(0, 2, 1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        X = np.asarray(MiniRocket(random_state=0).fit_transform(X.astype(np.float32)))
+
+    def decide(train, test):
+        ridge = RidgeClassifierCV(np.logspace(-3, 3, 10))
+        pipe = make_pipeline(StandardScaler(with_mean=False), ridge)
+        pipe.fit(X[train], recordings.actions[train])
+        scores = pipe.decision_function(X[test])
+        # Of two classes the library gives one column.
+        return pipe.classes_, scores if scores.ndim > 1 else np.column_stack([-scores, scores])
+
+    return {ROCKET: {"": Scored(recordings, decide)}}
+
+
+# -- all of them ------------------------------------------------------------------------
+
+CLASSIFIER, NEAREST, DTW_SVM = "`ActionClassifier`", "1-NN DTW", "SVM on DTW"
+PYRAMID, ROCKET = "Fourier pyramid + SVM", "MiniRocket + ridge"
+# The function, the views, the lengths, the package.
+WAYS = [
+    (dtw, VIEWS, (50,), "aeon"),
+    (rocket, VIEWS, (50, 100), "aeon"),
+    (classifier, (COSINES, BOTH), (None,), None),
+    (pyramid, VIEWS, (50, 100), None),
+]
+
+
+def ways():
+    """(function, view, length) of everything that is installed; those that take long first."""
+    return [
+        (way, view, n_frames)
+        for way, views, lengths, package in WAYS
+        for view in views
+        for n_frames in lengths
+        if package is None or version_of(package) is not None
+    ]
+
 
 # -- folds ------------------------------------------------------------------------------
 
@@ -87,8 +339,8 @@ def examine_split(recognizer, recordings, train, test):
     error = calibration_error(probabilities.max(axis=1), right)
     return {
         SPLITS: [right.mean()],
-        LOSS: [loss if recognizer.tempered else np.nan],
-        ERROR: [error if recognizer.tempered else np.nan],
+        LOSS: [loss],
+        ERROR: [error],
         AREA: [unknown_area(recognizer, actions, action, train, test) for action in classes],
     }
 
@@ -114,13 +366,13 @@ def examine_fold(figure, recognizer, recordings, train, test):
 
 
 def examine(way, view, n_frames, recordings, tasks):
-    """{name: {setting: {figure: values}}} of tasks, each a function and folds."""
+    """{(name, setting): {figure: values}} of tasks, each a function and folds."""
     found: dict = {}
     for name, settings in way(recordings, view, n_frames).items():
         for setting, recognizer in settings.items():
             lengths = [f"{n_frames} frames"] if n_frames else []
             text = ", ".join([view, *lengths, *filter(None, [setting])])
-            figures = found.setdefault(name, {}).setdefault(text, {})
+            figures = found.setdefault((name, text), {})
             for look, folds in tasks:
                 for fold in folds:
                     for figure, values in look(recognizer, recordings, *fold).items():
@@ -129,7 +381,10 @@ def examine(way, view, n_frames, recordings, tasks):
 
 
 def examine_all(recordings, tasks):
-    """Of all ways; those that know nothing to share between folds are given one at a time."""
+    """{name: {setting: {figure: values}}} of all ways.
+
+    Those that know nothing to share between folds are given one at a time.
+    """
     work = []
     for way, view, n_frames in ways():
         parts = [tasks]
@@ -138,19 +393,17 @@ def examine_all(recordings, tasks):
         work += [(way, view, n_frames, recordings, part) for part in parts]
     found: dict = {}
     for part in Parallel(n_jobs=-1)(delayed(examine)(*one) for one in work):
-        for name, settings in part.items():
-            for setting, figures in settings.items():
-                known = found.setdefault(name, {}).setdefault(setting, {})
-                for figure, values in figures.items():
-                    known[figure] = known.get(figure, []) + values
+        for (name, setting), figures in part.items():
+            known = found.setdefault(name, {}).setdefault(setting, {})
+            for figure, values in figures.items():
+                known[figure] = known.get(figure, []) + values
     return found
 
 
 # -- tables -----------------------------------------------------------------------------
 
 
-def share(value):
-    return f"{100 * value:.1f}"
+to_tenth = partial(percent, digits=1)
 
 
 def three_digits(value):
@@ -159,17 +412,17 @@ def three_digits(value):
 
 # Header, figure, what is made of its values, how it is shown, and which is best.
 SPLIT_COLUMNS = [
-    (f"{SPLITS}, mean", SPLITS, np.mean, share, max),
-    ("worst split", SPLITS, np.min, share, max),
-    (LEFT_OUT, LEFT_OUT, np.mean, share, max),
+    (f"{SPLITS}, mean", SPLITS, np.mean, to_tenth, max),
+    ("worst split", SPLITS, np.min, to_tenth, max),
+    (LEFT_OUT, LEFT_OUT, np.mean, to_tenth, max),
     (LOSS, LOSS, np.mean, three_digits, min),
     (ERROR, ERROR, np.mean, three_digits, min),
     (AREA, AREA, np.nanmean, three_digits, max),
 ]
 FOLD_COLUMNS = [
-    (LEFT_OUT, LEFT_OUT, np.mean, share, max),
-    (ALONE, ALONE, np.mean, share, max),
-    (f"{ALONE}, worst", ALONE, np.min, share, max),
+    (LEFT_OUT, LEFT_OUT, np.mean, to_tenth, max),
+    (ALONE, ALONE, np.mean, to_tenth, max),
+    (f"{ALONE}, worst", ALONE, np.min, to_tenth, max),
 ]
 
 
@@ -197,7 +450,7 @@ def recognition_table(name, found, columns):
 
 def shares(figures, columns):
     """What settings are chosen by: shares that are recognised, ties by the next column."""
-    return [summary(figures[figure]) for _, figure, summary, show, _ in columns if show is share]
+    return [summary(figures[figure]) for _, figure, summary, show, _ in columns if show is to_tenth]
 
 
 def numbers(figures, columns):
@@ -244,7 +497,7 @@ def rejection_table(recordings, splits, name):
             both = [one[KNOWN][0][0], one[kind][0][0]]
             strange = np.repeat([0, 1], list(map(len, both)))
             areas.append(roc_auc_score(strange, np.concatenate(both)))
-        print_row(kind, [share(rejected), f"{np.mean(areas):.2f}" if areas else "-"])
+        print_row(kind, [to_tenth(rejected), f"{np.mean(areas):.2f}" if areas else "-"])
 
 
 # -- exercises done right and wrong -----------------------------------------------------
@@ -299,127 +552,44 @@ def exercise_tables(every):
     exercise_table(every, "learnt from every second trial", every_second)
 
 
-# -- time -------------------------------------------------------------------------------
-
-ROUNDS, PAIRS = 3, 300
-BAND = 0.25
-
-
-def took(function):
-    start = time.perf_counter()
-    function()
-    return time.perf_counter() - start
-
-
-def print_times(rows, peers):
-    """Median seconds of functions that run in turns, and medians of ratios to those of peers.
-
-    rows and peers are {name: function}. One thread each; a first round, in which functions are
-    compiled, does not count.
-    """
-    functions = [*rows.values(), *peers.values()]
-    with threadpool_limits(1), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        seconds = np.array([[took(f) for f in functions] for _ in range(ROUNDS + 1)])[1:]
-    medians = np.median(seconds, axis=0)
-    for i, row in enumerate(rows):
-        ratios = np.median(seconds[:, [i]] / seconds[:, len(rows) :], axis=0)
-        pairs = zip(medians[len(rows) :], ratios, strict=True)
-        print_row(row, [f"{medians[i]:.2f}", *(f"{m:.2f} ({r:.2f})" for m, r in pairs)])
-
-
-def time_table(recordings, train, test):
-    """Learning from a split and asking, against the nearest neighbour by aeon's DTW."""
-    bands = {}
-    if version_of("aeon") is not None:
-        bands = {"aeon's 1-NN DTW": {}, f"the same, band of {BAND}": {"window": BAND}}
-    print_head("learn and predict, s (ratio)", [CLASSIFIER, *bands])
-    for view in (COSINES, BOTH):
-        X = np.ascontiguousarray(on_clock(recordings, view, 50).transpose(0, 2, 1))
-        ours = partial(Classifier(recordings, view).predict, train, test)
-        peers = {
-            name: partial(nearest, X, recordings.actions, train, test, band)
-            for name, band in bands.items()
-        }
-        print_times({f"{len(train)} and {len(test)} clips, {view}": ours}, peers)
-
-
-def nearest(X, actions, train, test, params):
-    from aeon.classification.distance_based import KNeighborsTimeSeriesClassifier
-
-    model = KNeighborsTimeSeriesClassifier(distance="dtw", distance_params=params)
-    model.fit(X[train], actions[train]).predict(X[test])
-
-
-def distance_table(recordings):
-    """Both directions of all pairs of 50 frames, against one direction by dtaidistance."""
-    windows = {}
-    if version_of("dtaidistance") is not None:
-        window = int(BAND * 50) + 1
-        windows = {"dtaidistance": None, f"dtaidistance, window={window}": window}
-    print_head("`synchronization_distances`, s (ratio)", ["ours", *windows])
-    for view in (COSINES, BOTH):
-        X = on_clock(recordings, view, 50)
-        X = X[np.arange(PAIRS) % len(X)]
-        ours = {
-            f"{PAIRS} x {PAIRS}, {view}, {cost}": partial(synchronization_distances, X, cost=cost)
-            for cost in ("velocity", "elastic", "posture")
-        }
-        print_times(ours, {name: partial(warped, X, window) for name, window in windows.items()})
-
-
-def warped(X, window):
-    from dtaidistance import dtw_ndim
-
-    dtw_ndim.distance_matrix_fast(list(X), window=window, parallel=False)
-
-
 # -- all of it --------------------------------------------------------------------------
 
 
-TABLES = "actions", "rejected", "exercises", "times"
-
-
-def print_tables(kinect, splits, optical, every, tables=TABLES):
-    """Of clips with splits of their actors, of clips of few actors, and of exercises."""
+def action_tables(kinect, optical, splits):
+    """Of clips with splits of their actors, and of clips of few actors."""
     left_out = partial(examine_fold, LEFT_OUT)
-    if "actions" in tables:
-        tasks = [(examine_split, splits), (left_out, actors_left_out(kinect.actors))]
-        recognition_table(kinect.name, examine_all(kinect, tasks), SPLIT_COLUMNS)
-        tasks = [
-            (left_out, actors_left_out(optical.actors)),
-            (partial(examine_fold, ALONE), actors_alone(optical.actors)),
-        ]
-        recognition_table(optical.name, examine_all(optical, tasks), FOLD_COLUMNS)
-    if "rejected" in tables:
-        rejection_table(kinect, splits, SPLITS)
-        for recordings in (kinect, optical):
-            rejection_table(recordings, actors_left_out(recordings.actors), LEFT_OUT)
-    if "exercises" in tables:
-        exercise_tables(every)
-    if "times" in tables:
-        time_table(kinect, *splits[0])
-        distance_table(kinect)
+    tasks = [(examine_split, splits), (left_out, actors_left_out(kinect.actors))]
+    recognition_table(kinect.name, examine_all(kinect, tasks), SPLIT_COLUMNS)
+    tasks = [
+        (left_out, actors_left_out(optical.actors)),
+        (partial(examine_fold, ALONE), actors_alone(optical.actors)),
+    ]
+    recognition_table(optical.name, examine_all(optical, tasks), FOLD_COLUMNS)
 
 
-def main():
-    """Print the tables."""
-    if len(sys.argv) < 2 or not set(sys.argv[2:]) <= set(TABLES):
-        sys.exit(__doc__)
-    folder, tables = Path(sys.argv[1]), sys.argv[2:] or TABLES
-    packages = ("sklearn_motionsync", "numpy", "scipy", "scikit-learn", "aeon", "dtaidistance")
-    versions = {package: version_of(package) for package in packages}
-    print(", ".join(f"{name} {version or 'not installed'}" for name, version in versions.items()))
-    for package in ("aeon", "dtaidistance"):
-        if versions[package] is None:
-            print(f"\nWithout {package} there are no rows and columns of it.")
+def rejection_tables(kinect, optical, splits):
+    rejection_table(kinect, splits, SPLITS)
+    for recordings in (kinect, optical):
+        rejection_table(recordings, actors_left_out(recordings.actors), LEFT_OUT)
+
+
+def read(folder):
+    """UTKinect, HDM05, and the splits of UTKinect."""
     kinect, optical = (
         as_recordings(name, load_performances(folder / archive / f"{archive}_positions.npz"))
         for archive, name in (("utkinect", "UTKinect"), ("hdm05", "HDM05"))
     )
     splits = published_splits(folder / "utkinect" / "utkinect_splits.json", kinect.actors)
-    print_tables(kinect, splits, optical, exercise_recordings(folder), tables)
+    return kinect, optical, splits
 
+
+TABLES = {
+    "actions": lambda folder: action_tables(*read(folder)),
+    "rejected": lambda folder: rejection_tables(*read(folder)),
+    "exercises": lambda folder: exercise_tables(exercise_recordings(folder)),
+}
 
 if __name__ == "__main__":
-    main()
+    command = command_line(__doc__)
+    print_versions("scipy", "scikit-learn", "aeon")
+    run_tables(TABLES, command)

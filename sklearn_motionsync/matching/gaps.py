@@ -31,7 +31,7 @@ __all__ = [
 # ones. Without it a path would stay where nothing was seen. docs/design.md.
 UNSEEN = 0.3
 # Noise of the features by which others are predicted, as a share of their variance: few people have
-# shown them together (benchmarks/expectation.py).
+# shown them together (docs/design.md).
 SHRINKAGE = 0.2
 
 

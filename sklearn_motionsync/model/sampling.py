@@ -11,7 +11,7 @@ __all__ = ["PERFORMANCE", "POSTURE", "sample_performances", "sample_postures"]
 
 # Shares of the variance of a sampled posture: of one training performance, of a mixture of all,
 # and of noise that is independent in every feature; a sampled performance has the first two. Noise
-# tangles limbs; the first keeps bodies in one piece and styles apart (benchmarks/samples.py).
+# tangles limbs; the first keeps bodies in one piece and styles apart (docs/design.md).
 POSTURE = (0.84, 0.14, 0.02)
 PERFORMANCE = (0.64, 0.36)
 # A performance that is outside reaches its training performance in so many steps.

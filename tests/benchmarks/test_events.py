@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-PATH = Path(__file__).resolve().parents[2] / "benchmarks" / "events.py"
-SPEC = importlib.util.spec_from_file_location("events", PATH)
+PATH = Path(__file__).resolve().parents[2] / "benchmarks" / "harness.py"
+SPEC = importlib.util.spec_from_file_location("harness", PATH)
 events = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(events)
 

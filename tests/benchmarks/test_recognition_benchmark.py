@@ -19,11 +19,6 @@ def recognition(benchmark):
 
 
 @pytest.fixture(scope="module")
-def recognizers(benchmark):
-    return benchmark("recognizers")
-
-
-@pytest.fixture(scope="module")
 def bunch():
     """Three people: each bends twice, gets up twice, and does both backwards."""
     bunch = make_bending(6, n_actors=3, n_frames=24, random_state=0)
@@ -35,8 +30,8 @@ def bunch():
 
 
 @pytest.fixture(scope="module")
-def recordings(recognizers, bunch):
-    return recognizers.as_recordings("few", bunch)
+def recordings(recognition, bunch):
+    return recognition.as_recordings("few", bunch)
 
 
 class Nearest:
@@ -98,16 +93,16 @@ def test_calibration_error_equals_hand_computation(recognition):
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1, 1e4])
-def test_temperature_recovers_probabilities(recognizers, unit):
+def test_temperature_recovers_probabilities(recognition, unit):
     # Two classes, scores that differ by 1, the larger right in 9 of 10: the odds are 9.
     scores = unit * np.tile([0.0, 1.0], (10, 1))
-    slope = recognizers.slope_of(scores + 5 * unit, np.repeat([0, 1], [1, 9]))
+    slope = recognition.slope_of(scores + 5 * unit, np.repeat([0, 1], [1, 9]))
     assert slope * unit == pytest.approx(np.log(9), rel=1e-3)
 
 
-def test_temperature_is_fitted_on_held_out_subjects(recognizers, recordings):
+def test_temperature_is_fitted_on_held_out_subjects(recognition, recordings):
     decide = Nearest(np.arange(18.0), recordings.actions)
-    one = recognizers.Scored(recordings, decide)
+    one = recognition.Scored(recordings, decide)
     train, test = np.flatnonzero(recordings.actors != "s02"), np.array([1, 4, 7, 10])
     classes, probabilities = one.probabilities(train, test)
     assert classes.tolist() == ["bending", "rising", "sinking"]
@@ -121,20 +116,20 @@ def test_temperature_is_fitted_on_held_out_subjects(recognizers, recordings):
     np.testing.assert_array_equal(predicted, classes[probabilities.argmax(axis=1)])
 
 
-def test_class_of_the_held_out_subject_alone_ranks_last(recognizers, recordings):
+def test_class_of_the_held_out_subject_alone_ranks_last(recognition, recordings):
     actions = np.where(np.arange(18) == 0, "alone", recordings.actions)
-    strange = recognizers.Recordings("few", recordings.views, actions, recordings.actors)
-    one = recognizers.Scored(strange, Nearest(np.arange(18.0), strange.actions))
+    strange = recognition.Recordings("few", recordings.views, actions, recordings.actors)
+    one = recognition.Scored(strange, Nearest(np.arange(18.0), strange.actions))
     classes, probabilities = one.probabilities(np.arange(18), np.arange(3))
     assert classes.tolist() == ["alone", "bending", "rising", "sinking"]
     assert np.isfinite(probabilities).all()
 
 
-def test_auc_of_an_unknown_action(recognition, recognizers, recordings):
+def test_auc_of_an_unknown_action(recognition, recordings):
     values = np.array([0.0, 0, 0, 0, 0, 0, 9, 9, 9, 9, 9, 9])
     decide = Nearest(values, recordings.actions)
     one, (train, test) = (
-        recognizers.Scored(recordings, decide),
+        recognition.Scored(recordings, decide),
         (np.arange(0, 12, 2), np.arange(1, 12, 2)),
     )
     args = one, recordings.actions, "rising", train, test
@@ -143,31 +138,31 @@ def test_auc_of_an_unknown_action(recognition, recognizers, recordings):
     assert np.isnan(recognition.unknown_area(one, recordings.actions, "rising", train, test[3:]))
 
 
-# -- recognizers ------------------------------------------------------------------------
+# -- recognition ------------------------------------------------------------------------
 
 
-def test_fourier_amplitudes_of_sine_waves(recognizers):
+def test_fourier_amplitudes_of_sine_waves(recognition):
     t = np.arange(40) / 40
     X = (3 + 2 * np.cos(2 * np.pi * 4 * t))[np.newaxis, :, np.newaxis]
-    found = recognizers.fourier_pyramid(X, n_levels=2, n_frequencies=5)[0]
+    found = recognition.fourier_pyramid(X, n_levels=2, n_frequencies=5)[0]
     # Four waves in the whole are two in either half.
     np.testing.assert_allclose(found, [3, 0, 0, 0, 1] + 2 * [3, 0, 1, 0, 0], atol=1e-12)
 
 
-def test_kernels_use_the_training_set_only(recognizers):
+def test_kernels_use_the_training_set_only(recognition):
     D = np.array([[0.0, 2, 4, 9], [2, 0, 6, 9], [4, 6, 0, 9], [9, 9, 9, 0]])
-    K = recognizers.mean_kernel([D, 2 * D], np.arange(3))
+    K = recognition.kernel_of(2 * D, np.arange(3))
     np.testing.assert_allclose(K, np.exp(-D / 4))
 
 
-def test_benchmarked_pipeline_is_that_of_the_manual(recognizers, bunch, recordings):
+def test_benchmarked_pipeline_is_that_of_the_manual(recognition, bunch, recordings):
     train, test = np.flatnonzero(bunch.actor != "s03"), np.flatnonzero(bunch.actor == "s03")
     views = make_union(DirectionCosines(bunch.skeleton), JointPositions(bunch.skeleton))
     pipe = make_pipeline(views.set_output(transform="pandas"), ActionClassifier())
     groups = bunch.actor[train]
     pipe.fit([bunch.data[i] for i in train], bunch.target[train], actionclassifier__groups=groups)
     expected = pipe.predict_proba([bunch.data[i] for i in test])
-    one = recognizers.Classifier(recordings, recognizers.BOTH)
+    one = recognition.Classifier(recordings, recognition.BOTH)
     np.testing.assert_allclose(one.probabilities(train, test)[1], expected, rtol=1e-6)
     np.testing.assert_array_equal(one.predict(train, test), bunch.target[test])
 
@@ -186,9 +181,9 @@ class Alike:
         return self.values[test]
 
 
-def test_an_exercise_is_judged_by_other_subjects(recognition, recognizers):
+def test_an_exercise_is_judged_by_other_subjects(recognition):
     actors, right = np.repeat(["a", "b", "c"], 4), np.tile([1, 0, 1, 0], 3)
-    recordings = recognizers.Recordings("one", {}, right, actors)
+    recordings = recognition.Recordings("one", {}, right, actors)
     some = recognition.every_second(recordings)
     np.testing.assert_array_equal(some, np.tile([True, True, False, False], 3))
     # In one of 36 pairs of a right and a wrong trial the wrong one has more.
@@ -199,14 +194,14 @@ def test_an_exercise_is_judged_by_other_subjects(recognition, recognizers):
     assert judge.seen == [[4, 5, 8, 9], [0, 1, 8, 9], [0, 1, 4, 5]]
 
 
-def test_contrast_is_of_the_second_class(recognizers, recordings):
+def test_contrast_is_of_the_second_class(recognition, recordings):
     right = (recordings.actions == "bending").astype(int)
-    some = recognizers.Recordings("bend", recordings.views, right, recordings.actors)
+    some = recognition.Recordings("bend", recordings.views, right, recordings.actors)
     train, test = np.flatnonzero(some.actors != "s03"), np.flatnonzero(some.actors == "s03")
     decide = Nearest(np.where(right == 1, 5.0, 2.0), right)
     for recognizer in (
-        recognizers.Scored(some, decide),
-        recognizers.Classifier(some, recognizers.COSINES),
+        recognition.Scored(some, decide),
+        recognition.Classifier(some, recognition.COSINES),
     ):
         found = recognizer.contrast(train, test)
         assert found[right[test] == 1].min() > found[right[test] == 0].max()
@@ -215,40 +210,34 @@ def test_contrast_is_of_the_second_class(recognizers, recordings):
 # -- tables -----------------------------------------------------------------------------
 
 
-def test_all_tables_of_a_tiny_set_without_peers(
-    recognition, recognizers, recordings, capsys, monkeypatch
-):
+def test_all_tables_of_a_tiny_set_without_peers(recognition, recordings, capsys, monkeypatch):
     hasty = partial(ActionClassifier, ["posture"], n_frames=12)
     short = [
         (way, views[:1], (lengths[0] and 12,), package)
-        for way, views, lengths, package in recognizers.WAYS
+        for way, views, lengths, package in recognition.WAYS
     ]
-    for module in (recognition, recognizers):
-        monkeypatch.setattr(module, "version_of", lambda package: None)
-    for module, name, value in (
-        (recognizers, "ActionClassifier", hasty),
-        (recognizers, "WAYS", short),
-        (recognition, "ROUNDS", 1),
-        (recognition, "PAIRS", 6),
-    ):
-        monkeypatch.setattr(module, name, value)
+    monkeypatch.setattr(recognition, "version_of", lambda package: None)
+    monkeypatch.setattr(recognition, "ActionClassifier", hasty)
+    monkeypatch.setattr(recognition, "WAYS", short)
     splits = recognition.actors_left_out(recordings.actors)[:1]
     two = recordings.actors != "s03"
-    few = recognizers.Recordings(
+    few = recognition.Recordings(
         "two people",
         {view: list(compress(some, two)) for view, some in recordings.views.items()},
         recordings.actions[two],
         recordings.actors[two],
     )
     right = (recordings.actions == "bending").astype(int)
-    every = [recognizers.Recordings("bend", recordings.views, right, recordings.actors)]
+    every = [recognition.Recordings("bend", recordings.views, right, recordings.actors)]
     with threadpool_limits(1), parallel_config(backend="sequential"):
-        recognition.print_tables(recordings, splits, few, every)
+        recognition.action_tables(recordings, few, splits)
+        recognition.rejection_tables(recordings, few, splits)
+        recognition.exercise_tables(every)
     tables = capsys.readouterr().out.strip().split("\n\n")
     rows = [[line.strip("| ").split(" | ") for line in table.splitlines()] for table in tables]
     for head, _, *body in rows:
         assert {len(row) for row in body} == {len(head)}
-    assert [len(body) - 2 for body in rows] == [4, 4, 8, 8, 8, 2, 2, 2, 6]
+    assert [len(body) - 2 for body in rows] == [3, 3, 8, 8, 8, 2, 2]
     assert [row[0] for row in rows[5][2:]] == ["bend", "mean"]
     ours = {row[0]: row[1:] for row in rows[0][2:]}["`ActionClassifier`, cosines"]
     assert ours[:3] == ["100.0"] * 3

@@ -218,11 +218,11 @@ def test_coverage_of_known_warps_of_one_source(noise, n_features, benchmark):
 
 def test_coverage_of_people_held_out(real_data, benchmark):
     """Key moments of people that had no part in the fit; constants are those of the package."""
-    people = benchmark("people")
-    events = benchmark("events")
-    chosen = [e for e in events.EVENTS if e[:2] in (events.BEND, events.ELBOW, events.STAND)]
+    harness = benchmark("harness")
+    shown = harness.BEND, harness.ELBOW, harness.STAND
+    chosen = [event for event in harness.EVENTS if event[:2] in shown]
     inside, n = [], 0
-    for one in people.read_people(real_data, chosen, patterns=4):
+    for one in harness.read_people(real_data, chosen, patterns=4):
         actors = np.asarray(one.actors)
         for actor in np.unique(actors):
             train, test = np.flatnonzero(actors != actor), np.flatnonzero(actors == actor)
