@@ -1,40 +1,28 @@
-"""Walking followed live: how far the phase is from foot strikes, and movements that begin anew.
+"""Walking followed live: how far the phase is from foot strikes.
 
-    python benchmarks/live_cycles.py DATA_FOLDER
+    python benchmarks/live_cycles.py DATA_FOLDER [jogs] [walks] [angles] [kinect]
 
-1. Cycles, by ``OnlineSynchronizer(cyclic=True)``. A template is learnt from the cycles that
-`CycleSegmenter` cuts from the takes of others. A minute is chained from the cycles of the person
-held out, as foot strikes cut them (cycles.py): each is drawn to the beginning of the next, the pace
-goes from 0.75 to 1.25 of its own within 20 seconds, the body travels, turns round twice, and begins
-in mid-cycle. The truth is a line between foot strikes; the phase of the other foot is that of the
-training cycles. Of the angles of `make_gait` it is the moment that each frame shows. Errors are in
-per cent of a cycle, from the second cycle on. A strike is told when the number of the cycle rises;
-it is missed where none is within a quarter of a cycle. The walks of CMU are of one person, so that
-takes are held out. UTKinect has one or two cycles a take, and many of its strikes are no strikes:
-four of ten people have a cycle with the other foot in its middle.
-
-2. Single actions of live_people.py, begun anew after 40 %: at once, or from the first posture, to
-which the body goes back within 15 % of the clip. Errors of the second attempt are in frames of 100.
-
-What stands in `online` was chosen on these sets: the cost of a new attempt, what stands still, and
-by how much intervals of cycles are widened. Takes four minutes.
+By ``OnlineSynchronizer(cyclic=True)``. A template is learnt from the cycles that `CycleSegmenter`
+cuts from the takes of others. A minute is chained from the cycles of the person held out, as foot
+strikes cut them (cycles.py): each is drawn to the beginning of the next, the pace goes from 0.75 to
+1.25 of its own within 20 seconds, the body travels, turns round twice, and begins in mid-cycle. The
+truth is a line between foot strikes; the phase of the other foot is that of the training cycles. Of
+the angles of `make_gait` it is the moment that each frame shows. Errors are in per cent of a cycle,
+from the second cycle on. A strike is told when the number of the cycle rises; it is missed where
+none is within a quarter of a cycle. The walks of CMU are of one person, so that takes are held out.
+UTKinect has one or two cycles a take, and many of its strikes are no strikes: four of ten people
+have a cycle with the other foot in its middle. By how much intervals of cycles are widened was
+chosen on these sets. Takes four minutes.
 """
 
-import os
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
-
-import argparse
 import warnings
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from cycles import foot_strikes, read
-from harness import EVENTS, P, read_actions
-from live import ARCHIVES
-from live_people import held_out, phase_of
+from harness import P, command_line, print_head, print_row, run_tables
+from live import phase_of
 from sklearn_motionsync import (
     CycleSegmenter,
     DenseSynchronizer,
@@ -248,100 +236,61 @@ def figures(walker):
     }
 
 
-def show_cycles(name, people):
-    print(f"\n{name}: from the second cycle on", flush=True)
-    columns = ["", "error (%) median / 90 %", "confidence > .5", "inside, width (%)"]
+def cycle_table(name, people):
+    """Of each person and of all, from the second cycle on; and confidences of what is no walk."""
+    columns = ["error (%) median / 90 %", "confidence > .5", "inside, width (%)"]
     columns += ["strikes, missed, extra, taken back", "late (ms) median, 90 % of distances"]
-    print("| " + " | ".join(columns) + " |\n|" + "---|" * len(columns))
+    print_head(name, columns)
     rows, wrong = {}, {}
     for walker in people:
         rows[walker.name] = figures(walker)
         for kind, x in walker.wrong.items():
             (found,) = walker.live.track([x])
             wrong.setdefault(kind, []).append(found.confidence[len(x) // 5 :])
-        print_row(walker.name, rows[walker.name])
-    print_row("all", {
-        key: np.sum([row[key] for row in rows.values()], axis=0)
-        if key in ("strikes", "falls")
-        else np.concatenate([row[key] for row in rows.values()])
-        for key in next(iter(rows.values()))
-    })  # fmt: skip
+        print_row(walker.name, cells_of(rows[walker.name]))
+    whole = {key: [row[key] for row in rows.values()] for key in next(iter(rows.values()))}
+    sums = {key: np.sum(whole.pop(key), axis=0) for key in ("strikes", "falls")}
+    print_row("all", cells_of(sums | {key: np.concatenate(each) for key, each in whole.items()}))
     for kind, confidences in wrong.items():
         c = np.concatenate(confidences)
         quantiles = " ".join(f"{q:.2f}" for q in np.quantile(c, [0.1, 0.5, 0.9]))
-        print(
-            f"  {kind}: confidence, quantiles 10 50 90 %: {quantiles}; > .5: {np.mean(c > 0.5):.2f}"
-        )
+        print_row(f"{kind}, confidence", ["", f"{np.mean(c > 0.5):.2f} ({quantiles})", "", "", ""])
 
 
-def print_row(name, row):
+def cells_of(row):
     error, late = row["error"], row["late"]
-    cells = [
+    return [
         f"{np.median(error):.1f} / {np.quantile(error, 0.9):.1f}",
         f"{np.mean(row['confidence'] > 0.5):.2f}",
         f"{np.mean(row['inside']):.2f}, {np.mean(row['width']):.0f}",
         ", ".join(str(n) for n in (*row["strikes"], row["falls"])),
         f"{np.median(late):.0f}, {np.quantile(np.abs(late), 0.9):.0f}",
     ]
-    print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
 
 
-def begun_anew(clip, gradually):
-    """A clip that begins anew after 40 %, and the frame at which it does."""
-    first = clip[: round(0.4 * (len(clip) - 1)) + 1]
-    between = clip[:0]
-    if gradually:
-        share = np.linspace(0, 1, max(2, round(0.15 * len(clip))) + 2)[1:-1, np.newaxis]
-        between = (1 - share) * first[-1] + share * clip[0]
-    return np.concatenate([first, between, clip]), len(first) + len(between)
-
-
-def show_attempts(name, folds):
-    """Errors of second attempts; and how many clips that are done once are told as two."""
-    print(f"\n{name}, begun anew after 40 %: median / 90 % quantile of errors (frames of {P})")
-    print("| | all frames | after a fifth, of all | highest 90 % of an action |\n|" + "---|" * 4)
-    for kind in ("at once", "gradually"):
-        found = {}
-        for action, some in folds.items():
-            for fold in some:
-                clips = [begun_anew(clip, kind == "gradually") for clip in fold.clips]
-                lives = fold.online.track([clip for clip, _ in clips])
-                for live, (_, begin), truth in zip(lives, clips, fold.truths, strict=True):
-                    found.setdefault(action, []).append(np.abs(live.phase[begin:] - truth))
-        late = {a: [x[-(-len(x) // 5) :] for x in some] for a, some in found.items()}
-        cells = [
-            "{:.1f} / {:.1f}".format(
-                *np.quantile(np.concatenate([e for some in x.values() for e in some]), [0.5, 0.9])
-            )
-            for x in (found, late)
-        ]
-        cells.append(f"{max(np.quantile(np.concatenate(x), 0.9) for x in late.values()):.1f}")
-        print(f"| {kind} | " + " | ".join(cells) + " |", flush=True)
-    cycles = [live.cycle[-1] for some in folds.values() for fold in some for live in fold.live]
-    print(
-        f"  told as begun anew, of clips done once: {np.sum(np.array(cycles) > 0)} of {len(cycles)}"
-    )
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder", help="folder of hdm05, cmu07_walk and utkinect")
-    folder = parser.parse_args().folder
-    # Takes without cycles, and of other movements, warn.
-    warnings.simplefilter("ignore")
+def jogs(folder):
     others = {name: read_takes(folder, "hdm05", name) for name in OTHERS}
-    jogs = read_takes(folder, "hdm05", "jogLeftCircle4StepsRstart")
-    show_cycles("Jogs (HDM05), people held out", walkers(jogs, "left", others))
-    walks = read_takes(folder, "cmu07_walk", "walk")
-    show_cycles("Walks (CMU), takes held out", walkers(walks, "right", {}))
-    show_cycles("Angles (make_gait), people held out", gait_walkers())
-    kinect = read_takes(folder, "utkinect", "walk")
-    waving = {"waveHands": read_takes(folder, "utkinect", "waveHands")}
-    show_cycles("Walks (UTKinect), people held out", walkers(kinect, "right", waving))
-    actions = read_actions(folder, [e for e in EVENTS if e.archive in ARCHIVES])
-    for archive, name in ARCHIVES.items():
-        show_attempts(name, held_out([a for a in actions if a.archive == archive]))
+    takes = read_takes(folder, "hdm05", "jogLeftCircle4StepsRstart")
+    cycle_table("jogs (HDM05), people held out", walkers(takes, "left", others))
+
+
+def walks(folder):
+    takes = read_takes(folder, "cmu07_walk", "walk")
+    cycle_table("walks (CMU), takes held out", walkers(takes, "right", {}))
+
+
+def kinect(folder):
+    takes = read_takes(folder, "utkinect", "walk")
+    others = {"waveHands": read_takes(folder, "utkinect", "waveHands")}
+    cycle_table("walks (UTKinect), people held out", walkers(takes, "right", others))
+
+
+def angles(folder):
+    cycle_table("angles (make_gait), people held out", gait_walkers())
 
 
 if __name__ == "__main__":
-    main()
+    # Takes without cycles, and of other movements, warn.
+    warnings.simplefilter("ignore")
+    tables = {"jogs": jogs, "walks": walks, "angles": angles, "kinect": kinect}
+    run_tables(tables, command_line(__doc__))

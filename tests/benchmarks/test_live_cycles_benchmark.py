@@ -40,13 +40,3 @@ def test_bodies_are_turned_about_the_vertical(cycles):
     np.testing.assert_allclose(
         cycles.turned(np.array([[[0.0, 0, 1]]]), np.array([np.pi / 2]))[0, 0], [1, 0, 0], atol=1e-12
     )
-
-
-@pytest.mark.parametrize("gradually", [False, True])
-def test_trials_begin_anew_after_40_per_cent(cycles, gradually):
-    clip = np.arange(101.0)[:, np.newaxis]
-    twice, begin = cycles.begun_anew(clip, gradually)
-    np.testing.assert_array_equal(twice[:41], clip[:41])
-    np.testing.assert_array_equal(twice[begin:], clip)
-    assert begin == 41 + 15 * gradually
-    assert np.diff(twice[:, 0]).min() == pytest.approx(-2.5 if gradually else -40)
