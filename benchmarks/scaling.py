@@ -4,16 +4,11 @@ Random bends of 100 frames as points of their aSpace, 16 features, single precis
 once, in five minutes. Every line is of a process of its own. Memory is its peak above what it had
 when it began, data in memory included; pages of a memory map that were looked at count, though the
 system can take them back. Processor time of one thread. ``memory`` takes ten minutes, ``sample``
-one, ``many`` ten, ``classes`` (`ActionClassifier` of four actions) three. ``long`` (two minutes) is
-of long performances, long takes and films; another checkout of the package runs beside it, in
-alternation.
+one, ``many`` ten, and ``classes`` (`ActionClassifier` of four actions) three.
 
-    OMP_NUM_THREADS=1 python benchmarks/scaling.py [memory] [sample] [many] [classes] [long]
-        [--beside FOLDER]
+    OMP_NUM_THREADS=1 python benchmarks/scaling.py [memory] [sample] [many] [classes]
 """
 
-import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -28,7 +23,7 @@ from sklearn_motionsync.datasets import make_bending
 FOLDER = Path(tempfile.gettempdir())
 # So many performances are drawn, and written, at a time.
 AT_ONCE = 1000
-MEMORY = """
+COMMON = """
 import sys, time
 import numpy as np
 from sklearn_motionsync import DenseSynchronizer
@@ -38,10 +33,6 @@ def peak():
 def forget_peak():
     with open("/proc/self/clear_refs", "w") as refs:
         refs.write("5")
-"""
-COMMON = (
-    MEMORY
-    + """
 class Files:
     def __init__(self, path, n):
         self.path, self.n = path, n
@@ -60,7 +51,6 @@ else:
     X = np.load(path, mmap_mode="r" if mode == "map" else None)[:n]
 size = n * 100 * 16 * 4
 """
-)
 FIT = """
 before, start = peak(), time.process_time()
 sync = DenseSynchronizer(**settings).fit(X)
@@ -87,52 +77,6 @@ for first in range(0, n, at_once):
     sync.transform(X if at_once == n else X[first : first + at_once])
 seconds = time.process_time() - start
 print(f"{seconds:.0f} s | {1e3 * seconds / n:.2f} ms | {(peak() - before) / 2**20:.0f} MB |")
-"""
-# What takes long, by name: what is made before, and what is measured.
-LONG = {
-    "`transform` of 24 clips of 250 to 540 frames": (
-        """
-def clip(n):
-    own, t = np.random.default_rng(n), np.linspace(0, 1, n)
-    t = t + 0.05 * np.sin(np.pi * t) * own.standard_normal()
-    waves = [np.sin(2 * np.pi * (k / 8 * t + 0.1 * k)) for k in range(4, 20)]
-    return np.column_stack(waves) + 0.02 * own.standard_normal((n, 16))
-X = [clip(n) for n in np.linspace(250, 540, 24).astype(int)]
-sync = DenseSynchronizer().fit(X)
-""",
-        "sync.transform(X)",
-    ),
-    "`DirectionCosines` of 1e6 frames, fit and transform": (
-        """
-from sklearn_motionsync import DirectionCosines
-from sklearn_motionsync.datasets import make_bending
-bunch = make_bending(1, random_state=0)
-X = np.resize(bunch.data[0], (1_000_000, 45))
-""",
-        "DirectionCosines(bunch.skeleton).fit(X).transform(X)",
-    ),
-    "a GIF of 40 pictures of six bodies": (
-        """
-import os, matplotlib, tempfile
-matplotlib.use("Agg")
-from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DirectionCosines
-from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.display import SkeletonDisplay
-bunch = make_bending(8, random_state=0)
-pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(8), DenseSynchronizer())
-display = SkeletonDisplay.from_estimator(pipe.fit(bunch.data), bunch.data)
-path = os.path.join(tempfile.mkdtemp(), "film.gif")
-display.animate(seconds=0.2, fps=10).save(path, "pillow")
-""",
-        "display.animate(seconds=4, fps=10).save(path, 'pillow')",
-    ),
-}
-MEASURED = """
-forget_peak()
-before, start = peak(), time.process_time()
-{call}
-print(time.process_time() - start, (peak() - before) / 1e6)
 """
 
 
@@ -222,36 +166,8 @@ def classes():
             print(f"| {n} | {len(model.landmarks_)} | {row} |", flush=True)
 
 
-def long(beside=None):
-    """Medians of three processes each; with another checkout its figures come first."""
-    print("| | processor time, s | peak above the start, MB |")
-    print("|---|---|---|")
-    for name, (setup, call) in LONG.items():
-        code, found = MEMORY + setup + MEASURED.format(call=call), {}
-        for _ in range(3):
-            for folder in filter(None, (beside, Path(__file__).resolve().parents[1])):
-                command, paths = [sys.executable, "-c", code], {"PYTHONPATH": str(folder)}
-                given = {"env": {**os.environ, **paths}, "cwd": folder}
-                run = subprocess.run(command, check=True, capture_output=True, text=True, **given)
-                found.setdefault(folder, []).append([float(x) for x in run.stdout.split()])
-        medians = np.array([np.median(x, axis=0) for x in found.values()])
-        seconds, megabytes = (" to ".join(f"{x:.3g}" for x in column) for column in medians.T)
-        print(f"| {name} | {seconds} | {megabytes} |", flush=True)
-
-
-SECTIONS = {"memory": memory, "sample": sample, "many": many, "classes": classes, "long": long}
-
-
-def main():
-    """Print the sections that were asked for, or all."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("sections", nargs="*", default=list(SECTIONS))
-    parser.add_argument("--beside", help="another checkout, for the section long")
-    options = parser.parse_args()
-    for name in options.sections:
-        print(f"\n## {name}\n")
-        SECTIONS[name](*[options.beside] * (name == "long"))
-
-
 if __name__ == "__main__":
-    main()
+    sections = {"memory": memory, "sample": sample, "many": many, "classes": classes}
+    for name in sys.argv[1:] or sections:
+        print(f"\n## {name}\n")
+        sections[name]()
