@@ -1,21 +1,14 @@
 """Animations of displays, played in a notebook without a network connection."""
 
-import logging
-import pathlib
 import re
-from contextlib import nullcontext
-from inspect import signature
 
 import numpy as np
 
 from ..matching.counting import whole
 from .drawing import pyplot
-from .gif import gif_writer
-from .redrawing import Redrawing
 
 __all__ = ["animate"]
 
-_LOG = logging.getLogger(__name__)
 # Resolution of the pictures: the notebook stores all of them.
 _DPI = 64
 # The largest number of pictures: about half an hour at 15 a second.
@@ -40,6 +33,7 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
     Returns
     -------
     FuncAnimation
+        Its ``save`` is that of Matplotlib, but for the layout, which is computed once.
     """
     from matplotlib.animation import FuncAnimation
 
@@ -69,11 +63,6 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
         """An animation that computes the layout once and needs no network."""
 
         def save(self, *args, **kwargs):
-            bound = signature(super().save).bind(*args, **kwargs)
-            _choose_writer(bound.arguments, fps)
-            # What other animations change is not known.
-            has_others = bound.arguments.get("extra_anim")
-            redrawing = nullcontext() if has_others else Redrawing(figure)
             # The layout takes longer than the drawing, and each picture would repeat it.
             layout = figure.get_layout_engine()
             figure.draw_without_rendering()
@@ -81,8 +70,7 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
             # Saving a picture draws it; drawing it on the canvas before would double the time.
             figure.canvas.draw_idle = _do_nothing
             try:
-                with redrawing:
-                    super().save(*bound.args, **bound.kwargs)
+                super().save(*args, **kwargs)
             finally:
                 del figure.canvas.draw_idle, figure.get_layout_engine
                 figure.set_layout_engine(layout)
@@ -105,32 +93,6 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
     return NotebookAnimation(
         figure, lambda k: show(k, count - 1), frames=count, interval=1000 / fps, blit=False
     )
-
-
-def _choose_writer(arguments, fps):
-    """Take the writer with one palette where matplotlib would take Pillow for a GIF.
-
-    Parameters
-    ----------
-    arguments : dict
-        The arguments of ``save``, which are changed.
-    fps : float
-        The default.
-    """
-    from matplotlib import rcParams
-    from matplotlib.animation import writers
-
-    name = arguments.get("writer") or rcParams["animation.writer"]
-    is_gif = pathlib.Path(arguments["filename"]).suffix.lower() == ".gif"
-    if not is_gif or not isinstance(name, str):
-        return
-    if name != "pillow":
-        if writers.is_available(name):
-            return
-        _LOG.warning("The writer %s of movies is not there; Pillow is used instead.", name)
-    options = ("codec", "bitrate", "extra_args", "metadata")
-    options = {key: arguments.pop(key) for key in options if arguments.get(key) is not None}
-    arguments["writer"] = gif_writer(arguments.pop("fps", None) or fps, **options)
 
 
 def _do_nothing(*args, **kwargs):

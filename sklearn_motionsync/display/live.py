@@ -396,7 +396,8 @@ class PhaseDisplay:
         -------
         Animation
             A notebook plays it as the last value of a cell; ``to_jshtml()`` gives the HTML,
-            ``save(path)`` a file.
+            ``save(path)`` a GIF or a video, for which Matplotlib draws the whole figure picture by
+            picture.
         """
         longest = max(p.times[-1] for p in self._performances)
         view = {"seconds": seconds, "fps": fps, "azimuth": azimuth}

@@ -619,7 +619,8 @@ class SkeletonDisplay:
         -------
         Animation
             A notebook plays it as the last value of a cell; ``to_jshtml()`` gives the HTML,
-            ``save(path)`` a file.
+            ``save(path)`` a GIF or a video, for which Matplotlib draws the whole figure picture by
+            picture. `write_player` is the fast way to moving bodies, and its file is smaller.
         """
         return animate(
             self,
