@@ -53,7 +53,7 @@ after = aligned[:, :, 1].argmax(axis=1)
 
 display = SynchronizationDisplay.from_predictions(
     trials,
-    match.times,
+    match,
     features=["knee_flexion", "vertical_force"],
     groups=gait.group,
     unit="percent",

@@ -10,8 +10,10 @@ from ..body.limbs import unit_vectors
 from ..body.skeleton import Skeleton, check_columns, loose_joints
 from ..inputs.numbers import as_numbers, check_finite, column_names, nanmean
 from ..matching.gaps import interpolate_gaps
+from .drawing import COLORS, bone_lines, stage
 
 __all__ = [
+    "BodyPanel",
     "bones_by_side",
     "bounds",
     "invert_postures",
@@ -221,3 +223,33 @@ def bounds(places):
     least = _FLAT * (high - low).max() or 1.0
     lacking = np.maximum(least - (high - low), 0) / 2
     return low - lacking, high + lacking
+
+
+class BodyPanel:
+    """The observed body, before the mean body at the phase ahead."""
+
+    def __init__(self, axis, performance, action, skeleton, azimuth):
+        self._action, self._bones = action, bones_by_side(skeleton)
+        self._bodies, self._mean = (
+            project(x, skeleton, azimuth) for x in (performance.body, action.body)
+        )
+        self.ahead = bone_lines(axis, COLORS["shadow"], 5, zorder=1)
+        self.bones = {
+            side: bone_lines(axis, COLORS[side], 2) for side in ("middle", "left", "right")
+        }
+        self.head, self._head = None, None
+        if "head" in skeleton.landmarks:
+            self._head = landmark_track(self._bodies, skeleton, "head")
+            (self.head,) = axis.plot([], [], "o", color=COLORS["middle"], markersize=5)
+        places = [x.reshape(-1, 2) for x in (self._bodies, self._mean)]
+        stage(axis, "", *bounds(np.concatenate(places)))
+
+    def show(self, now, ahead):
+        """Move to a frame, and the mean body to a phase."""
+        body, mean = self._bodies[now], self._action.interpolate(ahead, self._mean)
+        bones = [bone for of_side in self._bones.values() for bone in of_side]
+        self.ahead.set_segments([mean[list(bone)] for bone in bones])
+        for side, lines in self.bones.items():
+            lines.set_segments([body[list(bone)] for bone in self._bones[side]])
+        if self.head is not None:
+            self.head.set_data(self._head[[now]].T)

@@ -2,12 +2,14 @@
 
 from itertools import cycle
 from textwrap import fill
+from typing import NamedTuple
 
 import numpy as np
 
 __all__ = [
     "COLORS",
     "WIDTH",
+    "GroupCurves",
     "bone_lines",
     "curves",
     "front_line",
@@ -43,6 +45,8 @@ _GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"]
 _LINES = ["-", "--", ":", "-."]
 # Points between a legend and a title above it.
 _GAP = 6
+# Rounding of the largest bound, in units of the last place.
+_ROUNDING = 64
 # Font sizes of a legend; the largest with which the legend fits into the figure is used.
 _SIZES = ["small", "x-small", "xx-small"]
 
@@ -292,3 +296,86 @@ def group_styles(groups):
         palette, lines = pyplot().colormaps["viridis"](np.linspace(0, 0.95, len(names))), _LINES
     pairs = zip(palette, cycle(lines), strict=False)
     return dict(zip(names, pairs, strict=False))
+
+
+class GroupCurves(NamedTuple):
+    """The mean, the band and the performances of all, or of one group, in each panel.
+
+    Attributes
+    ----------
+    mean, lower, upper : ndarray, shape (P, n_panels)
+        The bounds are NaN without a band.
+    performances : ndarray (n, P, n_panels), or None
+    label : str
+        The entry of the legend.
+    name : str or None
+        The name of a group.
+    color, line : str
+        The colour and the line style of the mean.
+    """
+
+    mean: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    performances: np.ndarray | None = None
+    label: str = ""
+    name: str | None = None
+    color: str = COLORS["mean"]
+    line: str = "-"
+
+    @property
+    def has_band(self):
+        return not np.isnan(self.lower).all()
+
+    def of_features(self, chosen):
+        """The same in some of the panels."""
+        shown = None if self.performances is None else self.performances[:, :, chosen]
+        bounds = (x[:, chosen] for x in self[:3])
+        return GroupCurves(*bounds, shown, *self[4:])
+
+    def outer_bounds(self):
+        """The bounds with a margin for rounding."""
+        largest = np.nanmax(np.abs([self.lower, self.upper]), axis=(0, 1), initial=0)
+        eps = np.finfo(np.result_type(self.mean, np.float32)).eps
+        margin = _ROUNDING * eps * largest
+        return self.lower - margin, self.upper + margin
+
+    def count_outside(self):
+        """The number of performances that leave the band in a drawn feature."""
+        lower, upper = self.outer_bounds()
+        outside = (self.performances < lower) | (self.performances > upper)
+        return int(outside.any(axis=(1, 2)).sum())
+
+    def draw_band(self, axis, clock, i):
+        """Draw the band of panel i, in grey or in the pale colour of the group."""
+        lower, upper = self.lower[:, i], self.upper[:, i]
+        color, edge, alpha, width = COLORS["envelope"], COLORS["pattern"], 0.35, 0.9
+        if self.name is not None:
+            color, edge, alpha, width = self.color, self.color, 0.18, 0.5
+        band = axis.fill_between(clock, lower, upper, color=color, alpha=alpha, linewidth=0)
+        for bound in (lower, upper):
+            axis.plot(clock, bound, color=edge, linewidth=width)
+        return band
+
+    def draw_performances(self, axis, clock, i):
+        """Draw the performances in panel i."""
+        behind = self.performances[:, :, i]
+        style = {"colors": COLORS["performance"], "linestyles": "dashed"}
+        if self.name is not None:
+            style = {"colors": self.color}
+        return curves(axis, [clock] * len(behind), behind, linewidths=0.7, alpha=0.5, **style)
+
+    def draw_departures(self, axis, time_axis, i):
+        """Draw the parts of performances outside the band in panel i."""
+        lower, upper = self.outer_bounds()
+        xs, ys = parts_outside(self.performances[:, :, i], lower[:, i], upper[:, i])
+        xs, violet = time_axis.convert(xs), COLORS["departure"]
+        return curves(axis, xs, ys, colors=violet, linewidths=1.4, zorder=3)
+
+    def draw_mean(self, axis, clock, i):
+        """Draw the mean in panel i."""
+        mean, color, dashes = self.mean[:, i], self.color, self.line
+        if self.name is not None:
+            return front_line(axis, clock, mean, color=color, linewidth=2, linestyle=dashes)
+        (line,) = axis.plot(clock, mean, color=color, linewidth=2, linestyle=dashes)
+        return line

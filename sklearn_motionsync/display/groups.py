@@ -25,9 +25,8 @@ from ..inputs.types import (
 from ..matching.counting import first_largest
 from ..synchronizers.match import check_coverage
 from .arguments import AxesLike, labels_of_signals
-from .drawing import curves, front_line, group_styles, legend_above, signal_panels
-from .keyframes import draw_keyframes, text_of_keyframe
-from .time_axis import TimeAxis, clock_rate, offset_label
+from .drawing import GroupCurves, group_styles, legend_above, signal_panels
+from .time_axis import TimeAxis, clock_rate, draw_keyframes, offset_label, text_of_keyframe
 
 __all__ = ["GroupDisplay", "display_of_groups"]
 
@@ -51,38 +50,25 @@ class GroupDisplay:
 
     Parameters
     ----------
-    curves : list of ndarray, shape (n_people_k, P, n_shown)
-        For each group the aligned signals of its people.
+    groups : list of GroupCurves
+        For each group the mean and the band of its people, of the signals and of their offsets at
+        last; and its trials, if they are drawn.
     offsets : list of ndarray, shape (n_people_k, P)
-        Their offsets, in the unit of time.
-    labels : list of str
-        Entries of the legend, one a group.
+        For each group the offsets of its people, in the unit of time.
+    axis : TimeAxis
+        The clock of the template.
     ylabels : list of str
         Labels of the signals.
     feature_names : list of str
         Names of the signals, as in the table of clusters.
-    statistic : {"sd", "se", "interval"}, default="sd"
-        The band: see `from_estimator`.
-    coverage : float, default=0.95
-        Probability of ``"interval"``.
-    whom : str, default="people"
-        What the units are, for the legend.
-    trials : list of ndarray, shape (n_trials_k, P, n_shown), default=None
-        For each group its trials, drawn thin.
+    title : str, default=""
+        The meaning of the bands, for the legend.
     events : DataFrame, shape (n_people, n_events), default=None
         Where the events of people are on the clock, in frames: lines and their spread.
-    clusters : DataFrame, default=None
-        As of `GroupComparison`, in the same unit: bars.
-    level : float, default=0.05
-        Level of the clusters, for the legend.
-    note : str, default=""
-        What is not shown, for the legend.
+    comparison : GroupComparison, default=None
+        In the same unit: its clusters are bars.
     pairs : bool, default=False
         Whether people of all groups are the same, in the same order: their dots are joined.
-    unit : {"frames", "percent", "seconds"}, default="percent"
-        Unit of time.
-    frame_rate : float, default=None
-        Frames of the clock a second, for seconds.
 
     Attributes
     ----------
@@ -115,40 +101,29 @@ class GroupDisplay:
     >>> display = GroupDisplay.from_estimator(
     ...     pipe, gait.data, gait.group, people=gait.person, features=[0, 1], units="degrees"
     ... )
-    >>> display.labels
+    >>> [group.label for group in display.groups]
     ['A: 12 trials of 4 people', 'B: 12 trials of 4 people']
     """
 
     def __init__(
         self,
-        curves: Sequence[PerformancesLike],
+        groups: Sequence[GroupCurves],
         offsets: Sequence[NumbersLike],
-        labels: Sequence[str],
+        axis: TimeAxis,
         *,
         ylabels: Sequence[str],
         feature_names: Sequence[str],
-        statistic: Literal["sd", "se", "interval"] = "sd",
-        coverage: float = 0.95,
-        whom: str = "people",
-        trials: Sequence[PerformancesLike] | None = None,
+        title: str = "",
         events: pd.DataFrame | None = None,
-        clusters: pd.DataFrame | None = None,
-        level: float = 0.05,
-        note: str = "",
+        comparison: GroupComparison | None = None,
         pairs: bool = False,
-        unit: Unit = "percent",
-        frame_rate: float | None = None,
     ) -> None:
-        self.curves, self.offsets = list(map(np.asarray, curves)), list(map(np.asarray, offsets))
-        self.labels, self.ylabels, self.feature_names = labels, ylabels, feature_names
-        self.statistic, self.coverage, self.whom = statistic, coverage, whom
-        self.trials = None if trials is None else list(map(np.asarray, trials))
-        self.events, self.clusters, self.level = events, clusters, level
-        self.note, self.pairs, self.unit, self.frame_rate = note, pairs, unit, frame_rate
-        self._axis = TimeAxis(unit, self.offsets[0].shape[1], None, frame_rate)
+        self.groups, self.offsets, self.axis = groups, list(map(np.asarray, offsets)), axis
+        self.ylabels, self.feature_names, self.title = ylabels, feature_names, title
+        self.events, self.comparison, self.pairs = events, comparison, pairs
 
     def __repr__(self):
-        return f"GroupDisplay({self.labels}, {self.feature_names})"
+        return f"GroupDisplay({[group.label for group in self.groups]}, {self.feature_names})"
 
     @classmethod
     def from_estimator(
@@ -283,62 +258,42 @@ class GroupDisplay:
         GroupDisplay
             The display itself.
         """
-        more = 0.6 + 0.2 * max(len(self.labels) - 2, 0) + 0.5 * (self.events is not None)
+        more = 0.6 + 0.2 * max(len(self.groups) - 2, 0) + 0.5 * (self.events is not None)
         self.figure_, self.axes_, top = signal_panels(ax, len(self.ylabels), more)
-        self.means_, self.bands_, self.trials_ = [], [], []
-        self.dots_, self.clusters_, self.events_ = [], [], []
-        styles = list(group_styles(self.labels).values())
         *above, timing = self.axes_
-        for i, (axis, label) in enumerate(zip(above, self.ylabels, strict=True)):
-            if self.trials is not None:
-                self.trials_.append(self._draw_trials(axis, i, styles))
-            self._draw_groups(axis, [x[:, :, i] for x in self.curves], styles)
-            axis.set_ylabel(label)
+        clock, unit = self.axis.clock, self.axis.unit
+        self.trials_ = []
+        if self.groups[0].performances is not None:
+            self.trials_ = [
+                [group.draw_performances(axis, clock, i) for group in self.groups]
+                for i, axis in enumerate(above)
+            ]
+        self.bands_, self.means_ = [], []
+        for i, axis in enumerate(self.axes_):
+            self.bands_.append([group.draw_band(axis, clock, i) for group in self.groups])
+            self.means_.append([group.draw_mean(axis, clock, i) for group in self.groups])
         timing.axhline(0, color="0.6", linewidth=0.8, zorder=0)
-        self._draw_groups(timing, self.offsets, styles)
-        timing.set_ylabel(offset_label(self.unit))
-        timing.set_xlabel(self._axis.label)
-        clock = self._axis.clock
-        for axis in self.axes_:
+        for axis, label in zip(self.axes_, [*self.ylabels, offset_label(unit)], strict=True):
+            axis.set_ylabel(label)
             axis.set_xlim(clock[0], clock[-1])
+        timing.set_xlabel(self.axis.label)
+        self.dots_, self.clusters_, self.events_ = [], [], []
         if self.events is not None:
             self._draw_events()
-        self._draw_dots(timing, styles)
-        bars = [] if self.clusters is None else self._draw_clusters()
+        self._draw_dots(timing)
+        bars = [] if self.comparison is None else self._draw_clusters()
         handles = list(zip(self.bands_[0], self.means_[0], strict=True))
-        labels = list(self.labels)
+        labels = [group.label for group in self.groups]
         if bars:
             handles.append(bars[0])
-            labels.append(f"differs, p at most {self.level:g}")
-        title = _STATISTICS[self.statistic].format(whom=self.whom, share=100 * self.coverage)
-        title += f"; {self.note}" if self.note else ""
-        legend_above(above, handles, labels, title, below=top, n_cols=1)
+            labels.append(f"differs, p at most {self.comparison.level:g}")
+        legend_above(above, handles, labels, self.title, below=top, n_cols=1)
         return self
-
-    def _draw_trials(self, axis, i, styles):
-        """Draw signal i of all trials."""
-        clock = self._axis.clock
-        return [
-            curves(axis, [clock] * len(x), x[:, :, i], colors=color, linewidths=0.5, alpha=0.35)
-            for x, (color, _) in zip(self.trials, styles, strict=True)
-        ]
-
-    def _draw_groups(self, axis, of_groups, styles):
-        """Draw the mean and the band of each group, of curves (n_people_k, P)."""
-        clock, means, bands = self._axis.clock, [], []
-        for values, (color, line) in zip(of_groups, styles, strict=True):
-            mean, half = band_of_mean(values, self.statistic, self.coverage)
-            low, high = mean - half, mean + half
-            band = axis.fill_between(clock, low, high, color=color, alpha=0.18, linewidth=0)
-            bands.append(band)
-            means.append(front_line(axis, clock, mean, color=color, linestyle=line))
-        self.means_.append(means)
-        self.bands_.append(bands)
 
     def _draw_events(self):
         """Draw the mean place of each event, and its spread between people, in all panels."""
         mean, spread = self.events.mean().to_numpy(), self.events.std().to_numpy()
-        at, spread = self._axis.convert(mean), self._axis.convert(spread)
+        at, spread = self.axis.convert(mean), self.axis.convert(spread)
         for axis in self.axes_:
             for middle, half in zip(at, spread, strict=True):
                 axis.axvspan(middle - half, middle + half, color="0.5", alpha=0.12, linewidth=0)
@@ -348,14 +303,14 @@ class GroupDisplay:
             at, texts, rotation=20, rotation_mode="anchor", ha="left", fontsize="small"
         )
 
-    def _draw_dots(self, axis, styles):
+    def _draw_dots(self, axis):
         """Draw the offsets of people at the events, or where the timing differs most."""
-        width, at = self._axis.clock[-1], self._moments()
+        width, at = self.axis.clock[-1], self._moments()
         low, high = np.floor(at).astype(int), np.ceil(at).astype(int)
         xs, ys = [], []
         for k, offsets in enumerate(self.offsets):
             beside = (k - (len(self.offsets) - 1) / 2) * _BESIDE * width
-            x = np.clip(self._axis.convert(at) + beside, 0, width)
+            x = np.clip(self.axis.convert(at) + beside, 0, width)
             y = offsets[:, low] + (at - low) * (offsets[:, high] - offsets[:, low])
             xs.append(np.broadcast_to(x, y.shape))
             ys.append(y)
@@ -363,22 +318,22 @@ class GroupDisplay:
             shape = len(xs), -1
             x, y = np.reshape(xs, shape), np.reshape(ys, shape)
             axis.plot(x, y, color="0.6", linewidth=0.6, zorder=4)
-        for x, y, (color, _) in zip(xs, ys, styles, strict=True):
-            x, y = x.ravel(), y.ravel()
-            dots = axis.scatter(x, y, s=12, color=color, edgecolor="white", linewidth=0.4, zorder=5)
-            self.dots_.append(dots)
+        for x, y, group in zip(xs, ys, self.groups, strict=True):
+            style = {"s": 12, "color": group.color, "edgecolor": "white", "linewidth": 0.4}
+            self.dots_.append(axis.scatter(x.ravel(), y.ravel(), zorder=5, **style))
 
     def _moments(self):
         """The frames of the clock at which offsets are shown person by person."""
         if self.events is not None:
             return self.events.mean().to_numpy()
-        if self.clusters is not None and len(timing := self._clusters_of("timing")):
-            return timing["peak"].to_numpy() * clock_rate(self._axis.clock)
+        if self.comparison is not None and len(timing := self._clusters_of("timing")):
+            return timing["peak"].to_numpy() * clock_rate(self.axis.clock)
         return np.array([first_largest(np.concatenate(self.offsets).var(axis=0))], dtype=float)
 
     def _clusters_of(self, what, feature=None):
         """The clusters of the timing, or of a signal."""
-        clusters = self.clusters[self.clusters["what"] == what]
+        clusters = self.comparison.clusters
+        clusters = clusters[clusters["what"] == what]
         return clusters if feature is None else clusters[clusters["feature"] == feature]
 
     def _draw_clusters(self):
@@ -424,8 +379,8 @@ def display_of_groups(
         chosen = choose_features(None, names)
         note = f"{len(chosen)} of {len(names)} signals"
     names = [names[i] for i in chosen]
-    clusters = None if comparison is None else comparison.clusters
-    if clusters is not None:
+    if comparison is not None:
+        clusters = comparison.clusters
         more = clusters[(clusters["what"] == "shape") & ~clusters["feature"].isin(names)]
         if len(more):
             note += f"{', ' if note else ''}differences also in "
@@ -433,24 +388,34 @@ def display_of_groups(
     default = dict(zip(aligned.names, aligned.units, strict=True))
     ylabels = labels_of_signals(names, default, ylabel, units)
     of_people = GroupsOfPeople.of(groups, people, n)
-    shown = aligned.curves[:, :, chosen]
-    return GroupDisplay(
-        of_people.means(shown),
-        of_people.means(aligned.offsets),
+    offsets, shown = of_people.means(aligned.offsets), aligned.curves[:, :, chosen]
+    whom = "trials" if people is None else "people"
+    title = _STATISTICS[statistic].format(whom=whom, share=100 * coverage)
+    of_groups = []
+    for label, (name, (color, line)), maker, signals, offset in zip(
         of_people.describe(people is not None),
+        group_styles(of_people.labels).items(),
+        of_people.makers,
+        of_people.means(shown),
+        offsets,
+        strict=True,
+    ):
+        panels = np.concatenate([signals, offset[:, :, np.newaxis]], axis=2)
+        mean, half = band_of_mean(panels, statistic, coverage)
+        drawn = shown[maker.any(axis=0)] if trials else None
+        of_groups.append(
+            GroupCurves(mean, mean - half, mean + half, drawn, label, name, color, line)
+        )
+    return GroupDisplay(
+        of_groups,
+        offsets,
+        TimeAxis.of_clock(aligned.unit, aligned.clock),
         ylabels=ylabels,
         feature_names=names,
-        statistic=statistic,
-        coverage=coverage,
-        whom="trials" if people is None else "people",
-        trials=[shown[maker.any(axis=0)] for maker in of_people.makers] if trials else None,
+        title=f"{title}; {note}" if note else title,
         events=_events_on_clock(events, aligned, of_people),
-        clusters=clusters,
-        level=0.05 if comparison is None else comparison.level,
-        note=note,
+        comparison=comparison,
         pairs=people is not None and of_people.are_pairs,
-        unit=aligned.unit,
-        frame_rate=clock_rate(aligned.clock),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import fill
-from typing import Any, Literal, NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -15,11 +15,10 @@ from ..inputs.features import choose_features, names_of_features
 from ..inputs.types import (
     Features,
     Indexed,
-    PerformanceLike,
     PerformancesLike,
-    SupportsArray,
     ValuesLike,
 )
+from ..inputs.wording import counted
 from ..matching.counting import first_largest
 from ..online.stream import Course, LivePhase, each_value
 from ..online.synchronizer import OnlineSynchronizer
@@ -35,9 +34,8 @@ from .arguments import (
     as_names,
     times_from_zero,
 )
-from .bodies import bones_by_side, bounds, invert_postures, landmark_track, project
-from .dial import PhaseDial
-from .drawing import COLORS, WIDTH, bone_lines, front_line, legend_above, panels, stage
+from .bodies import BodyPanel, invert_postures
+from .drawing import COLORS, WIDTH, front_line, legend_above, panels
 
 __all__ = ["PhaseDisplay"]
 
@@ -57,6 +55,11 @@ _INTERVAL_OPACITY = 0.25
 _N_CYCLES = 5
 # The number of points of a prediction.
 _N_POINTS = 60
+# Inner and outer radius of the ring and of the arc around it; the radius of the numbers, and the
+# inner radius of the hand.
+_RING, _ARC, _NUMBERS, _HAND = (0.78, 1.0), (1.05, 1.13), 1.28, 0.62
+# The opacity of the ring at confidence 0.
+_MIN_OPACITY = 0.12
 
 
 class PhaseDisplay:
@@ -71,34 +74,16 @@ class PhaseDisplay:
 
     Parameters
     ----------
-    phases : LivePhase, or list of LivePhase
-        Of arrays (n_frames_i,); or of arrays (n_frames, n_streams).
-    n_frames : int
-        The length of the clock, ``P``.
-    times : list of array-like (n_frames_i,), default=None
-        The times of the frames; by default frame numbers.
-    duration : float, default=None
-        The mean duration of the action in the unit of the times; None predicts nothing.
-    seen : list of array-like (n_frames_i, n_shown), default=None
-        The observed features.
-    mean, spread : array-like, shape (P, n_shown), default=None
-        The expected features, and their standard deviation.
-    afterwards : list of array-like (n_frames_i,) or None, default=None
-        The phases as they are known at the end of a performance.
-    features : list of str, default=None
+    action : LearntAction
+        The learnt action, with its clock.
+    performances : list of RunningPerformance
+        The performances with their phases.
+    features : list of str, default=()
         The names of the features.
-    bodies : list of array-like (n_frames_i, n_joints, n_dims), default=None
-        Joint positions, y up; NaN where they were not observed.
-    mean_body : array-like, shape (P, n_joints, n_dims), default=None
-        The mean joint positions; together with bodies.
     skeleton : Skeleton, default=None
         The skeleton of the bodies.
-    names : list of str, default=None
-        The names of the performances.
     unit : {"frames", "seconds"}, default="frames"
         The unit of the times.
-    cyclic : bool, default=False
-        Whether the phases are those of cycles. The time axis then shows the last few of them.
 
     Attributes
     ----------
@@ -128,49 +113,18 @@ class PhaseDisplay:
 
     def __init__(
         self,
-        phases: LivePhase | Sequence[LivePhase],
-        n_frames: int,
+        action: LearntAction,
+        performances: Sequence[RunningPerformance],
         *,
-        times: Indexed[ValuesLike] | None = None,
-        duration: float | None = None,
-        seen: PerformancesLike | None = None,
-        mean: PerformanceLike | None = None,
-        spread: PerformanceLike | None = None,
-        afterwards: Indexed[ValuesLike | None] | None = None,
-        features: Sequence[str] | None = None,
-        bodies: Indexed[SupportsArray] | None = None,
-        mean_body: SupportsArray | None = None,
+        features: Sequence[str] = (),
         skeleton: Skeleton | None = None,
-        names: Sequence[str] | None = None,
         unit: Literal["frames", "seconds"] = "frames",
-        cyclic: bool = False,
     ) -> None:
-        phases = _as_list_of_phases(phases)
-        count, nothing = len(phases), [None] * len(phases)
-        self.names = list(map(str, range(count))) if names is None else names
-        self.unit, self.skeleton = unit, skeleton
-        n_shown = 0 if seen is None else np.shape(seen[0])[1]
-        self.features = [f"x{k}" for k in range(n_shown)] if features is None else features
-        learnt = map(_as_floats, (mean, spread, mean_body))
-        self._action = LearntAction(n_frames, cyclic, duration, *learnt)
-        times = nothing if times is None else times
-        times = [times_from_zero(t, len(of.phase)) for t, of in zip(times, phases, strict=True)]
-        parts = (nothing if x is None else x for x in (seen, afterwards, bodies))
-        self._performances = [
-            RunningPerformance(
-                *map(_as_floats, phase),
-                np.zeros(len(t), dtype=np.intp) if phase.cycle is None else phase.cycle,
-                t,
-                self._action.times_left(phase, t),
-                name,
-                *map(_as_floats, of_one),
-            )
-            for phase, name, t, *of_one in zip(phases, self.names, times, *parts, strict=True)
-        ]
+        self.action, self.performances = action, performances
+        self.features, self.skeleton, self.unit = features, skeleton, unit
 
     def __repr__(self):
-        count = len(self._performances)
-        return f"PhaseDisplay({count} performance{'s' * (count != 1)})"
+        return f"PhaseDisplay({counted(len(self.performances), 'performance')})"
 
     @classmethod
     def from_estimator(
@@ -248,31 +202,38 @@ class PhaseDisplay:
             features = [first_largest(live.mean_.var(axis=0))]
         shown = choose_features(features, feature_names)
         rate = 1.0 if live.frame_rate is None else live.frame_rate
-        bodies, mean_body, skeleton = None, None, None
+        bodies, mean_body, skeleton = [None] * len(seen), None, None
         if body is not None:
             skeleton = find_step(body, DirectionCosines)[1].skeleton.body()
             *bodies, mean_body = (invert_postures(x, body, skeleton) for x in (*seen, live.mean_))
-        display = cls(
-            phases,
+        action = LearntAction(
             live.n_frames_,
-            times=times if times or rate == 1 else [np.arange(len(x)) / rate for x in seen],
-            duration=live.duration_ / rate,
-            seen=[x[:, shown] for x in seen],
-            mean=live.mean_[:, shown],
-            spread=None if training is None else _spread(live, training)[:, shown],
-            afterwards=[
-                None
+            live.cyclic,
+            live.duration_ / rate,
+            live.mean_[:, shown],
+            None if training is None else _spread(live, training)[:, shown],
+            mean_body,
+        )
+        running = [
+            RunningPerformance.of(
+                action,
+                phase,
+                times_from_zero(times[k], len(x)) if times else np.arange(len(x)) / rate,
+                name=names[k],
+                seen=x[:, shown],
+                afterwards=None
                 if live.cyclic or np.isnan(x).any()
-                else _final_phases(live, takes.select([i]), len(x))
-                for i, x in zip(chosen, seen, strict=True)
-            ],
+                else _final_phases(live, takes.select([i]), len(x)),
+                body=bodies[k],
+            )
+            for k, (i, x, phase) in enumerate(zip(chosen, seen, phases, strict=True))
+        ]
+        display = cls(
+            action,
+            running,
             features=[feature_names[k] for k in shown],
-            bodies=bodies,
-            mean_body=mean_body,
             skeleton=skeleton,
-            names=names,
             unit="frames" if live.frame_rate is None else "seconds",
-            cyclic=live.cyclic,
         )
         return display.plot(ax, frame=frame, azimuth=azimuth)
 
@@ -282,19 +243,25 @@ class PhaseDisplay:
         phases: LivePhase | Sequence[LivePhase],
         n_frames: int,
         *,
+        duration: float | None = None,
+        cyclic: bool = False,
         frame: int | None = None,
         ax: AxesLike | None = None,
         azimuth: float = -60,
-        **known: Any,
     ) -> Self:
         """Draw phases that are known already, such as ``live.history``.
 
         Parameters
         ----------
         phases : LivePhase, or list of LivePhase
-            The phases of one performance or several.
+            The phases of one performance or several, of arrays (n_frames_i,); or of arrays
+            (n_frames, n_streams).
         n_frames : int
             The length of the clock, ``live.n_frames_``.
+        duration : float, default=None
+            The mean duration of the action in frames; None predicts nothing.
+        cyclic : bool, default=False
+            Whether the phases are those of cycles. The time axis then shows the last few of them.
         frame : int, default=None
             A frame of the longest performance; the others are drawn at the same time. By default
             the last.
@@ -302,8 +269,6 @@ class PhaseDisplay:
             See `plot`.
         azimuth : float, default=-60
             The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
-        **known : dict
-            Further parameters of the class.
 
         Returns
         -------
@@ -315,7 +280,12 @@ class PhaseDisplay:
         ValueError
             If phases are of another class, or there is no such frame.
         """
-        return cls(phases, n_frames, **known).plot(ax, frame=frame, azimuth=azimuth)
+        action = LearntAction(n_frames, cyclic, duration)
+        running = [
+            RunningPerformance.of(action, phase, np.arange(float(len(phase.phase))), name=str(k))
+            for k, phase in enumerate(_as_list_of_phases(phases))
+        ]
+        return cls(action, running).plot(ax, frame=frame, azimuth=azimuth)
 
     def plot(
         self, ax: AxesLike | None = None, *, frame: int | None = None, azimuth: float = -60
@@ -338,13 +308,13 @@ class PhaseDisplay:
         PhaseDisplay
             The display itself.
         """
-        longest = max((p.times for p in self._performances), key=lambda times: times[-1])
+        longest = max((p.times for p in self.performances), key=lambda times: times[-1])
         if frame is None:
             frame = len(longest) - 1
         frame = as_index(frame, len(longest), "frame")
-        has_body = self._performances[0].body is not None
+        has_body = self.performances[0].body is not None
         # Two panels beside each other; an odd last one has the whole width.
-        n_panels, count = has_body + 2 + len(self.features), len(self._performances)
+        n_panels, count = has_body + 2 + len(self.features), len(self.performances)
         places = [divmod(i, 2) for i in range(n_panels)]
         if n_panels % 2:
             places[-1] = (n_panels // 2, slice(None))
@@ -352,16 +322,16 @@ class PhaseDisplay:
         cells = [(each * k + row, column) for k in range(count) for row, column in places]
         size, before = (WIDTH, count * each * _ROW + 0.3), getattr(self, "axes_", ())
         self.figure_, self.axes_ = panels(ax, cells, count * each, 2, size, before)
-        end = max(self._action.end_of(p) for p in self._performances)
+        end = max(self.action.end_of(p) for p in self.performances)
         by_row = np.array(self.axes_, dtype=object).reshape(count, -1)
         self.rows_ = [
             PerformanceRow(
-                axes, p, self._action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth
+                axes, p, self.action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth
             )
-            for axes, p in zip(by_row, self._performances, strict=True)
+            for axes, p in zip(by_row, self.performances, strict=True)
         ]
-        for axes, name in zip(by_row, self.names, strict=True):
-            axes[0].set_title(fill(name, _LINE_LENGTH), fontsize="medium", parse_math=False)
+        for axes, p in zip(by_row, self.performances, strict=True):
+            axes[0].set_title(fill(p.name, _LINE_LENGTH), fontsize="medium", parse_math=False)
         for axis in by_row[:, has_body + 1 :].flat:
             axis.set_xlabel(TIME_LABELS[self.unit])
         self._show(longest[frame])
@@ -399,7 +369,7 @@ class PhaseDisplay:
             ``save(path)`` a GIF or a video, for which Matplotlib draws the whole figure picture by
             picture.
         """
-        longest = max(p.times[-1] for p in self._performances)
+        longest = max(p.times[-1] for p in self.performances)
         view = {"seconds": seconds, "fps": fps, "azimuth": azimuth}
         return animate(self, lambda k, last: self._show(longest * k / last), ax, **view)
 
@@ -425,10 +395,6 @@ def _as_list_of_phases(phases):
             for n in streams
         ]
     return listed
-
-
-def _as_floats(values):
-    return None if values is None else np.asarray(values, dtype=np.float64)
 
 
 def _final_phases(live, X, n_frames):
@@ -476,8 +442,8 @@ class LearntAction(NamedTuple):
         """Values at the frames of the clock, interpolated to phases."""
         clock = np.arange(self.n_frames)
         flat = values.reshape(self.n_frames, -1)
-        found = np.stack([np.interp(phase, clock, column) for column in flat.T], axis=-1)
-        return found.reshape(*np.shape(phase), *values.shape[1:])
+        there = np.stack([np.interp(phase, clock, column) for column in flat.T], axis=-1)
+        return there.reshape(*np.shape(phase), *values.shape[1:])
 
     def phase_ahead(self, phase, rate):
         """The phase a tenth of the duration later at this rate; of a cycle maybe in the next."""
@@ -485,13 +451,12 @@ class LearntAction(NamedTuple):
         ahead = phase + _AHEAD * last * rate
         return ahead if self.cyclic else min(ahead, last)
 
-    def times_left(self, found, times):
+    def times_left(self, phases, cycles, times):
         """The time left at every frame, as `OnlineSynchronizer.time_left` estimates it."""
         if self.duration is None:
             return np.zeros(len(times))
         course, out = Course(self.n_frames, self.duration, self.cyclic), []
-        cycles = np.zeros(len(times), dtype=np.intp) if found.cycle is None else found.cycle
-        for now in zip(times, found.phase, cycles, strict=True):
+        for now in zip(times, phases, cycles, strict=True):
             course.follow(*map(np.atleast_1d, now))
             out.append(course.time_left()[0])
         return np.array(out)
@@ -542,6 +507,14 @@ class RunningPerformance(NamedTuple):
     seen: np.ndarray | None = None
     afterwards: np.ndarray | None = None
     body: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, action, phases, times, **others):
+        """That of a LivePhase at times from 0 on, with the time that is left of the action."""
+        values = [None if x is None else np.asarray(x, dtype=np.float64) for x in phases[:5]]
+        cycle = np.zeros(len(times), dtype=np.intp) if phases.cycle is None else phases.cycle
+        left = action.times_left(values[0], cycle, times)
+        return cls(*values, cycle, times, left, **others)
 
 
 class PerformanceRow:
@@ -623,6 +596,81 @@ class PerformanceRow:
             curve.show(now, *rest)
 
 
+class PhaseDial:
+    """A ring from 0 % at the top clockwise to 100 %.
+
+    Parameters
+    ----------
+    axis : Axes
+
+    Attributes
+    ----------
+    passed : Wedge
+        From 0 to the phase; the opacity shows the confidence.
+    ahead : Wedge
+        From the phase to the phase ahead.
+    hand : Line2D
+        The line width shows the confidence.
+    share, state : Text
+        The phase in per cent; rate and confidence.
+    """
+
+    def __init__(self, axis):
+        from matplotlib.patches import Wedge
+
+        axis.set_aspect("equal")
+        axis.set_xlim(-1.5, 1.5)
+        axis.set_ylim(-1.75, 1.45)
+        axis.axis("off")
+
+        def ring(color, radii, zorder, end=90):
+            wedge = Wedge(
+                (0, 0),
+                radii[1],
+                end,
+                90,
+                width=radii[1] - radii[0],
+                facecolor=color,
+                linewidth=0,
+                zorder=zorder,
+            )
+            return axis.add_patch(wedge)
+
+        ring(COLORS["shadow"], _RING, 1, end=-270)
+        self.passed = ring(COLORS["performance"], _RING, 2)
+        self.ahead = ring(COLORS["mean"], _ARC, 3)
+        (self.hand,) = axis.plot([], [], color=COLORS["pattern"], solid_capstyle="round", zorder=4)
+        for quarter, text in enumerate(("0 %", "25", "50", "75")):
+            x, y = _on_circle(quarter / 4, _NUMBERS + 0.02 * (quarter % 2))
+            axis.text(
+                x, y, text, ha="center", va="center", color="0.35", fontsize="x-small", zorder=1
+            )
+        self.share = axis.text(0, 0, "", ha="center", va="center", fontsize="large")
+        self.state = axis.text(0, -1.62, "", ha="center", va="center", fontsize="small")
+
+    def show(self, share, ahead, rate, confidence, cycle=None):
+        """Move the hand to a share of the action, or of the cycle of this number."""
+        # Rounding may take a sum of probabilities above 1.
+        confidence = min(confidence, 1)
+        self.passed.set_theta1(90 - 360 * share)
+        self.passed.set_alpha(_MIN_OPACITY + (1 - _MIN_OPACITY) * confidence)
+        self.ahead.set_theta1(90 - 360 * ahead)
+        self.ahead.set_theta2(90 - 360 * share)
+        # A wedge of no length would be drawn as a whole ring.
+        self.ahead.set_visible(ahead > share)
+        self.hand.set_data(*np.transpose([_on_circle(share, _HAND), _on_circle(share, _RING[1])]))
+        self.hand.set_linewidth(1 + 4 * confidence)
+        self.share.set_text(f"{100 * share:.0f} %")
+        number = "" if cycle is None else f"cycle {cycle:.0f}, "
+        self.state.set_text(f"{number}rate {rate:.1f}, confidence {confidence:.2f}")
+
+
+def _on_circle(share, radius):
+    """The point at a share of a circle, clockwise from the top."""
+    angle = 2 * np.pi * share
+    return radius * np.sin(angle), radius * np.cos(angle)
+
+
 class FeaturePanel:
     """A feature as it was observed, and its prediction."""
 
@@ -664,36 +712,6 @@ class FeaturePanel:
             self.expected.set_data(times, mean)
         if spread is not None:
             _fill_area(self.band, times, mean - _BAND * spread, mean + _BAND * spread)
-
-
-class BodyPanel:
-    """The observed body, before the mean body at the phase ahead."""
-
-    def __init__(self, axis, performance, action, skeleton, azimuth):
-        self._action, self._bones = action, bones_by_side(skeleton)
-        self._bodies, self._mean = (
-            project(x, skeleton, azimuth) for x in (performance.body, action.body)
-        )
-        self.ahead = bone_lines(axis, COLORS["shadow"], 5, zorder=1)
-        self.bones = {
-            side: bone_lines(axis, COLORS[side], 2) for side in ("middle", "left", "right")
-        }
-        self.head, self._head = None, None
-        if "head" in skeleton.landmarks:
-            self._head = landmark_track(self._bodies, skeleton, "head")
-            (self.head,) = axis.plot([], [], "o", color=COLORS["middle"], markersize=5)
-        places = [x.reshape(-1, 2) for x in (self._bodies, self._mean)]
-        stage(axis, "", *bounds(np.concatenate(places)))
-
-    def show(self, now, ahead):
-        """Move to a frame, and the mean body to a phase."""
-        body, mean = self._bodies[now], self._action.interpolate(ahead, self._mean)
-        bones = [bone for of_side in self._bones.values() for bone in of_side]
-        self.ahead.set_segments([mean[list(bone)] for bone in bones])
-        for side, lines in self.bones.items():
-            lines.set_segments([body[list(bone)] for bone in self._bones[side]])
-        if self.head is not None:
-            self.head.set_data(self._head[[now]].T)
 
 
 def _label(text, value):

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..comparison.norm import NormComparison
 from ..inputs.features import choose_features
-from ..inputs.types import Features, PerformanceLike, Unit, ValuesLike
+from ..inputs.types import Features
 from ..inputs.wording import counted
 from .arguments import AxesLike, labels_of_signals
 from .drawing import COLORS, curves, front_line, legend_above, parts_outside, signal_panels
-from .time_axis import TimeAxis, clock_rate, offset_label
+from .time_axis import TimeAxis, offset_label
 
 __all__ = ["NormDisplay"]
 
@@ -25,26 +25,14 @@ class NormDisplay:
 
     Parameters
     ----------
-    curve : array-like, shape (P, n_shown)
-        Of the subject: signals, and the offset at last.
-    mean, std : array-like, shape (P, n_shown)
-        Of the norm, as of `NormComparison`.
-    limits : array-like, shape (n_shown,)
-        The largest deviation that is no departure, in standard deviations.
+    comparison : NormComparison
+        From `compare_to_norm`.
+    subject : label
+        One of ``comparison.verdicts.index``.
+    signals : list of int
+        The signals that are drawn, by index.
     labels : list of str
-        Of the panels.
-    title : str, default=""
-        The answer, in words.
-    subject : str, default="subject"
-        Its name, for the legend.
-    n_trials, n_people : int, default=1
-        Trials of the subject, and people of the norm.
-    level : float, default=0.05
-        Share of people of the norm that depart.
-    unit : {"frames", "percent", "seconds"}, default="percent"
-        Unit of time.
-    frame_rate : float, default=None
-        Frames of the clock a second, for seconds.
+        Their labels.
 
     Attributes
     ----------
@@ -76,33 +64,16 @@ class NormDisplay:
 
     def __init__(
         self,
-        curve: PerformanceLike,
-        mean: PerformanceLike,
-        std: PerformanceLike,
-        limits: ValuesLike,
-        *,
+        comparison: NormComparison,
+        subject: Hashable,
+        signals: Sequence[int],
         labels: Sequence[str],
-        title: str = "",
-        subject: str = "subject",
-        n_trials: int = 1,
-        n_people: int = 1,
-        level: float = 0.05,
-        unit: Unit = "percent",
-        frame_rate: float | None = None,
     ) -> None:
-        self.curve, self.mean, self.std = map(np.asarray, (curve, mean, std))
-        self.limits, self.labels, self.title, self.subject = (
-            np.asarray(limits),
-            labels,
-            title,
-            subject,
-        )
-        self.n_trials, self.n_people, self.level = n_trials, n_people, level
-        self.unit, self.frame_rate = unit, frame_rate
-        self._axis = TimeAxis(unit, len(self.curve), None, frame_rate)
+        self.comparison, self.subject = comparison, subject
+        self.signals, self.labels = signals, labels
 
     def __repr__(self):
-        return f"NormDisplay({self.title!r})"
+        return f"NormDisplay({self.comparison.describe(self.subject)!r})"
 
     @classmethod
     def from_comparison(
@@ -153,7 +124,7 @@ class NormDisplay:
         subjects = comparison.verdicts.index.to_list()
         if subject not in subjects:
             raise ValueError(f"There is no subject {subject!r}; there are {subjects[:8]}.")
-        i, signals = subjects.index(subject), comparison.features[:-1]
+        signals = comparison.features[:-1]
         if features is None:
             table = comparison.departures
             is_departure = (table["subject"] == subject) & (table["what"] == "shape")
@@ -165,22 +136,7 @@ class NormDisplay:
         names = [signals[k] for k in chosen]
         known_units = dict(zip(comparison.features, comparison.units, strict=True))
         labels = labels_of_signals(names, known_units, ylabel, units)
-        shown = [*chosen, len(signals)]
-        display = cls(
-            comparison.curves[i][:, shown],
-            comparison.mean[:, shown],
-            comparison.std[:, shown],
-            comparison.limits[i, shown],
-            labels=[*labels, offset_label(comparison.unit)],
-            title=comparison.describe(subject),
-            subject=str(subject),
-            n_trials=int(comparison.verdicts["n_trials"].iloc[i]),
-            n_people=comparison.n_people,
-            level=comparison.level,
-            unit=comparison.unit,
-            frame_rate=clock_rate(comparison.clock),
-        )
-        return display.plot(ax)
+        return cls(comparison, subject, chosen, labels).plot(ax)
 
     def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
@@ -196,14 +152,19 @@ class NormDisplay:
         NormDisplay
             The display itself.
         """
-        self.figure_, self.axes_, top = signal_panels(ax, len(self.labels) - 1, 1.0)
+        norm = self.comparison
+        subject = norm.verdicts.index.get_loc(self.subject)
+        axis_of_time = TimeAxis.of_clock(norm.unit, norm.clock)
+        self.figure_, self.axes_, top = signal_panels(ax, len(self.signals), 1.0)
         self.subject_, self.mean_, self.bands_ = [], [], []
         self.spread_, self.departures_ = [], []
-        clock = self._axis.clock
-        for i, (axis, label) in enumerate(zip(self.axes_, self.labels, strict=True)):
-            mean, std, curve = self.mean[:, i], self.std[:, i], self.curve[:, i]
-            lower, upper = mean - self.limits[i] * std, mean + self.limits[i] * std
-            grey, violet = COLORS["envelope"], COLORS["departure"]
+        clock, grey, violet = norm.clock, COLORS["envelope"], COLORS["departure"]
+        # The offset is the last of the signals.
+        shown, labels = [*self.signals, -1], [*self.labels, offset_label(norm.unit)]
+        for axis, k, label in zip(self.axes_, shown, labels, strict=True):
+            mean, std, curve = norm.mean[:, k], norm.std[:, k], norm.curves[subject, :, k]
+            reach = norm.limits[subject, k] * std
+            lower, upper = mean - reach, mean + reach
             band = axis.fill_between(clock, lower, upper, color=grey, alpha=0.3, linewidth=0)
             self.bands_.append(band)
             low, high = mean - std, mean + std
@@ -213,20 +174,22 @@ class NormDisplay:
             line = front_line(axis, clock, curve, color=COLORS["performance"], linewidth=2.4)
             self.subject_.append(line)
             xs, ys = parts_outside(curve[np.newaxis], lower, upper)
-            xs = self._axis.convert(xs)
+            xs = axis_of_time.convert(xs)
             lines = curves(axis, xs, ys, colors=violet, linewidths=2.8, zorder=5)
             self.departures_.append(lines)
             axis.set_ylabel(label)
             axis.set_xlim(clock[0], clock[-1])
-        self.axes_[-1].set_xlabel(self._axis.label)
+        self.axes_[-1].set_xlabel(axis_of_time.label)
         handles = [self.subject_[0], (self.spread_[0], self.mean_[0]), self.bands_[0]]
+        n_trials = int(norm.verdicts["n_trials"].iloc[subject])
         labels = [
-            f"{self.subject}: {counted(self.n_trials, 'trial')}",
-            f"norm: mean and standard deviation of {self.n_people} people",
-            f"{100 * (1 - self.level):.3g} % of new people stay inside in all panels",
+            f"{self.subject}: {counted(n_trials, 'trial')}",
+            f"norm: mean and standard deviation of {norm.n_people} people",
+            f"{100 * (1 - norm.level):.3g} % of new people stay inside in all panels",
         ]
         if any(len(lines.get_segments()) for lines in self.departures_):
             handles.insert(1, self.departures_[0])
             labels.insert(1, "departs")
-        legend_above(self.axes_[:-1], handles, labels, self.title, below=top, n_cols=1)
+        title = norm.describe(self.subject)
+        legend_above(self.axes_[:-1], handles, labels, title, below=top, n_cols=1)
         return self

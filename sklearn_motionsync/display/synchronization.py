@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Sequence
 from typing import Any, Self
 
@@ -17,13 +16,12 @@ from ..inputs.types import (
     NumbersLike,
     PerformanceLike,
     PerformancesLike,
-    SupportsArray,
     Unit,
     ValuesLike,
 )
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
-from ..synchronizers.match import check_coverage, match_of_times, rates_of
+from ..synchronizers.match import Match, check_coverage, match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer, with_frame_rate
 from .arguments import AxesLike, as_names
@@ -36,7 +34,8 @@ from .drawing import (
     legend_above,
     panels,
 )
-from .keyframes import (
+from .time_axis import (
+    TimeAxis,
     check_own_keyframes,
     check_pattern_keyframes,
     draw_keyframes,
@@ -44,7 +43,6 @@ from .keyframes import (
     named_keyframes,
     own_keyframes,
 )
-from .time_axis import TimeAxis
 
 __all__ = ["SynchronizationDisplay"]
 
@@ -71,8 +69,10 @@ class SynchronizationDisplay:
         The features of the performances at their own frames; NaN in gaps.
     after : array-like, shape (n_sequences, P, n_shown)
         The features on the clock of the pattern.
-    times : array-like, shape (n_sequences, P)
-        tau(p), in frames of the pattern.
+    match : Match
+        The warps, their intervals, and which performances are doubtful.
+    axis : TimeAxis
+        The times of the frames of performances and pattern.
     feature_names : list of str
         The names of the features.
     pattern : array-like, shape (P, n_shown), default=None
@@ -81,20 +81,12 @@ class SynchronizationDisplay:
         The index of the pattern among the performances.
     groups : sequence of length n_sequences, default=None
         The group of each performance, which determines its colour.
-    unit : {"frames", "percent", "seconds"}, default="frames"
-        The unit of time.
-    frame_rate : float, or array-like of shape (n_sequences,), default=None
-        Frames a second of the performances, for seconds.
     keyframes : array-like, shape (n_sequences, n_keyframes), default=None
         Key-frames of the performances in their frames, NaN where one is not known: ticks.
     pattern_keyframes : array-like of shape (n_keyframes,) or Series, default=None
         Key-frames on the clock: lines. The index of a Series holds their names.
-    intervals : array-like of shape (2, n_sequences, P), default=None
-        Lower and upper bounds of the times, in frames of the pattern: bands around the warps.
-    doubtful : array-like of bool, shape (n_sequences,), default=None
-        Performances that are dotted in all panels.
-    coverage : float, default=None
-        Probability of the intervals, which a title names.
+    coverage : float or None, default=0.9
+        Probability of the intervals around the warps, as of `from_estimator`.
 
     Attributes
     ----------
@@ -135,33 +127,27 @@ class SynchronizationDisplay:
         self,
         before: PerformancesLike,
         after: PerformancesLike,
-        times: NumbersLike,
+        match: Match,
+        axis: TimeAxis,
         *,
         feature_names: Sequence[str],
         pattern: PerformanceLike | None = None,
         pattern_index: int | None = None,
         groups: Labels | None = None,
-        unit: Unit = "frames",
-        frame_rate: float | ValuesLike | None = None,
         keyframes: NumbersLike | None = None,
         pattern_keyframes: ValuesLike | None = None,
-        intervals: Sequence[NumbersLike] | SupportsArray | None = None,
-        doubtful: ValuesLike | None = None,
-        coverage: float | None = None,
+        coverage: float | None = 0.9,
     ) -> None:
-        self.before = [np.asarray(x) for x in before]
-        self.after, self.times = np.asarray(after), np.asarray(times)
-        self.feature_names = feature_names
+        self.before, self.after = [np.asarray(x) for x in before], np.asarray(after)
+        self.match, self.axis, self.feature_names = match, axis, feature_names
         self.pattern = None if pattern is None else np.asarray(pattern)
-        self.pattern_index, self.unit, self.frame_rate = pattern_index, unit, frame_rate
+        self.pattern_index, self.coverage = pattern_index, coverage
         self.groups = None if groups is None else list(map(str, groups))
-        lengths = [len(x) for x in self.before]
-        self._axis = TimeAxis(unit, self.times.shape[1], lengths, frame_rate)
         self.keyframes = None if keyframes is None else np.asarray(keyframes, dtype=np.float64)
-        self.pattern_keyframes = check_pattern_keyframes(pattern_keyframes, self.times.shape[1])
-        self.intervals = None if intervals is None else np.asarray(intervals)
-        self.doubtful = None if doubtful is None else np.asarray(doubtful)
-        self.coverage = coverage
+        self.pattern_keyframes = check_pattern_keyframes(pattern_keyframes, match.times.shape[1])
+        tells = coverage is not None and match.intervals is not None
+        self.intervals = np.asarray(match.interval(coverage)) if tells else None
+        self.doubtful = match.doubtful if tells else None
 
     def __repr__(self):
         count = counted(len(self.before), "performance")
@@ -233,21 +219,19 @@ class SynchronizationDisplay:
         chosen = choose_features(features, names)
         match, shown = reached.match(), [x[:, chosen] for x in performances]
         groups = None if groups is None else names_of_groups(groups, len(performances))
-        tells = coverage is not None and match.intervals is not None
+        lengths = [len(x) for x in shown]
+        axis = TimeAxis(unit, match.times.shape[1], lengths, rates_of(X, frame_rate, unit))
         display = cls(
             shown,
             match.warp(shown),
-            match.times,
+            match,
+            axis,
             feature_names=[names[i] for i in chosen],
             pattern=synchronizer.pattern_[:, chosen],
             pattern_index=index_of_pattern(synchronizer, performances),
             groups=groups,
-            unit=unit,
-            frame_rate=rates_of(X, frame_rate, unit),
             keyframes=own_keyframes(synchronizer, performances, params),
             pattern_keyframes=named_keyframes(synchronizer, params.get("keyframes")),
-            intervals=match.interval(coverage) if tells else None,
-            doubtful=match.doubtful if tells else None,
             coverage=coverage,
         )
         return display.plot(ax, warps=warps, keyframe_lines=keyframe_lines)
@@ -256,7 +240,7 @@ class SynchronizationDisplay:
     def from_predictions(
         cls,
         X: PerformancesLike,
-        times: NumbersLike,
+        match: Match | NumbersLike,
         *,
         pattern: PerformanceLike | None = None,
         features: Features | None = None,
@@ -267,9 +251,7 @@ class SynchronizationDisplay:
         warps: bool = True,
         keyframes: NumbersLike | None = None,
         pattern_keyframes: ValuesLike | None = None,
-        intervals: Sequence[NumbersLike] | SupportsArray | None = None,
-        doubtful: ValuesLike | None = None,
-        coverage: float | None = None,
+        coverage: float | None = 0.9,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw performances and warps that are known already.
@@ -278,8 +260,8 @@ class SynchronizationDisplay:
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
             Performances, with NaN in gaps.
-        times : array-like, shape (n_sequences, P)
-            tau(p) from 0 to P - 1, such as ``synchronizer.match(X).times``.
+        match : Match, or array-like of shape (n_sequences, P)
+            Such as ``synchronizer.match(X)``; or the warps tau(p) from 0 to P - 1 alone.
         pattern : array-like, shape (P, n_features), default=None
             Drawn in front, with the features of X; by default the mean of the synchronised
             performances.
@@ -301,13 +283,8 @@ class SynchronizationDisplay:
         pattern_keyframes : array-like of shape (n_keyframes,) or Series, default=None
             Key-frames on the clock, such as ``synchronizer.keyframes_``: lines. The index of a
             Series holds their names.
-        intervals : array-like of shape (2, n_sequences, P), default=None
-            Lower and upper bounds of the times, in frames of the pattern, such as
-            ``match.interval(0.9)``: bands around the warps.
-        doubtful : array-like of bool, shape (n_sequences,), default=None
-            Performances that are dotted in all panels, such as ``match.doubtful``.
-        coverage : float, default=None
-            Probability of the intervals, such as 0.9, which the title of the warps names.
+        coverage : float or None, default=0.9
+            Probability of the intervals around the warps, as of `from_estimator`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -321,16 +298,15 @@ class SynchronizationDisplay:
         ValueError
             If there is not one row of times or key-frames a performance, the pattern has another
             shape, the number of names differs, there is no such feature, a value is infinite, or
-            a key-frame or an interval is not on the clock; or if ``doubtful`` is not True or False
-            for each performance.
+            a key-frame is not on the clock.
         """
         if coverage is not None:
             check_coverage(coverage)
         arrays, names = read_collection(X)
-        match, width = match_of_times(times, len(arrays)), arrays[0].shape[1]
+        if not isinstance(match, Match):
+            match = match_of_times(match, len(arrays))
+        width = arrays[0].shape[1]
         keyframes = check_own_keyframes(keyframes, len(arrays))
-        intervals = _check_intervals(intervals, match.times.shape)
-        doubtful = _check_doubtful(doubtful, len(arrays))
         if feature_names is None:
             feature_names = names or [f"x{i}" for i in range(width)]
         feature_names = as_names(feature_names, width, "feature_names", "features")
@@ -344,19 +320,18 @@ class SynchronizationDisplay:
                 raise ValueError(f"The pattern must have the shape {shape}, got {pattern.shape}.")
         chosen = choose_features(features, feature_names)
         shown = [x[:, chosen] for x in arrays]
+        lengths = [len(x) for x in shown]
+        axis = TimeAxis(unit, match.times.shape[1], lengths, rates_of(X, frame_rate, unit))
         display = cls(
             shown,
             match.warp(shown),
-            match.times,
+            match,
+            axis,
             feature_names=[feature_names[i] for i in chosen],
             pattern=None if pattern is None else pattern[:, chosen],
             groups=groups,
-            unit=unit,
-            frame_rate=rates_of(X, frame_rate, unit),
             keyframes=keyframes,
             pattern_keyframes=pattern_keyframes,
-            intervals=intervals,
-            doubtful=doubtful,
             coverage=coverage,
         )
         return display.plot(ax, warps=warps)
@@ -395,7 +370,7 @@ class SynchronizationDisplay:
         n_all = n_rows + bool(warps) * min(n_rows, 2)
         size = (WIDTH, max(2.6, 1.6 * n_all + 0.8) + bool(warps) + 0.2 * n_lines)
         self.figure_, self.axes_ = panels(ax, cells, n_all, 2, size)
-        clock, times = self._axis.clock, self._axis.performances()
+        clock, times = self.axis.clock, self.axis.performances()
         self.before_, self.after_, self.pattern_, self.group_means_ = [], [], [], []
         for row, name in enumerate(self.feature_names):
             left, right = self.axes_[2 * row : 2 * row + 2]
@@ -412,8 +387,8 @@ class SynchronizationDisplay:
                 left.set_title(f"as recorded\n{counted(len(self.before), 'trial')}{dotted}")
                 means = ", thick: group means" if styles else ""
                 right.set_title(f"aligned{means}\n{self._describe_pattern()}")
-        left.set_xlabel(self._axis.performance_label)
-        right.set_xlabel(self._axis.label)
+        left.set_xlabel(self.axis.performance_label)
+        right.set_xlabel(self.axis.label)
         self.warps_ = self.intervals_ = None
         if warps:
             self.intervals_ = self._draw_intervals(self.axes_[-1], clock, colors)
@@ -431,7 +406,7 @@ class SynchronizationDisplay:
     def _draw_keyframes(self, colors):
         """Draw key-frames: lines on the clock, with names once, and ticks of the performances."""
         if self.pattern_keyframes is not None:
-            times = self._axis.convert(self.pattern_keyframes.to_numpy())
+            times = self.axis.convert(self.pattern_keyframes.to_numpy())
             aligned = self.axes_[1 : 2 * len(self.feature_names) : 2]
             named = aligned if self.warps_ is None else [*aligned, self.axes_[-1]]
             for axis in named:
@@ -440,7 +415,7 @@ class SynchronizationDisplay:
                 lines = draw_keyframes(axis, times, names, by_diagonal=by_diagonal)
                 self.keyframes_.append(lines)
         if self.keyframes is not None:
-            times = self._axis.own(self.keyframes)
+            times = self.axis.own(self.keyframes)
             for axis in self.axes_[: 2 * len(self.feature_names) : 2]:
                 self.own_keyframes_.append(draw_own_keyframes(axis, times, colors))
 
@@ -492,17 +467,17 @@ class SynchronizationDisplay:
         return line
 
     def _draw_warps(self, axis, clock, colors):
-        times = self._axis.convert(self.times)
+        times = self.axis.convert(self.match.times)
         lines = self._draw_trials(axis, [clock] * len(times), times, colors)
         axis.plot(clock, clock, "--", color=COLORS["pattern"], linewidth=1)
-        bands = "" if self.intervals is None else "shaded: intervals"
-        if bands and self.coverage is not None:
+        bands = ""
+        if self.intervals is not None:
             bands = f"shaded: {100 * self.coverage:g} % intervals"
         dotted = self._describe_doubtful("dotted: ")
         second = "; ".join(words for words in (bands, dotted) if words)
         axis.set_title("\n".join(filter(None, ("warps; dashed: an even pace", second))))
-        axis.set_xlabel(self._axis.label)
-        axis.set_ylabel(_WARP_LABELS[self.unit])
+        axis.set_xlabel(self.axis.label)
+        axis.set_ylabel(_WARP_LABELS[self.axis.unit])
         for x, y, text, ha, va in (
             (0.04, 0.96, "later than\nthe template", "left", "top"),
             (0.96, 0.04, "earlier than\nthe template", "right", "baseline"),
@@ -519,7 +494,7 @@ class SynchronizationDisplay:
 
         if self.intervals is None:
             return None
-        lower, upper = self._axis.convert(self.intervals)
+        lower, upper = self.axis.convert(self.intervals)
         n_sequences, n_doubtful = len(lower), self._n_doubtful()
         xs = np.concatenate([clock, clock[::-1]])
         ys = np.concatenate([lower, upper[:, ::-1]], axis=1)
@@ -544,36 +519,3 @@ class SynchronizationDisplay:
 def _opacity(n_bands):
     """The opacity of each of so many bands, which overlap."""
     return float(np.clip(1 - (1 - _BANDS) ** (1 / max(n_bands, 1)), _FAINTEST, _BAND))
-
-
-def _check_intervals(intervals, shape):
-    """Bounds (2, n_sequences, P) of times of a shape (n_sequences, P); None if none are given."""
-    if intervals is None:
-        return None
-    usage = "lower and upper bounds in frames of the pattern, as from match.interval(0.9)"
-    bounds, last = as_numbers(intervals, "intervals", dtype=np.float64), shape[1] - 1
-    if bounds.shape != (2, *shape):
-        raise ValueError(f"intervals must have shape {(2, *shape)}: {usage}; got {bounds.shape}.")
-    lower, upper = bounds
-    # Not a number fails the comparison, too.
-    sound = ((lower >= 0) & (lower <= upper) & (upper <= last)).all(axis=1)
-    if not sound.all():
-        i = int(np.argmin(sound))
-        raise ValueError(
-            f"Performance {i}: intervals must be {usage}, from 0 to {last}, and the lower one must "
-            "not be above the upper one."
-        )
-    return bounds
-
-
-def _check_doubtful(doubtful, n_sequences):
-    """True or False (n_sequences,) for each performance; None if not given."""
-    if doubtful is None:
-        return None
-    flags = np.asarray(doubtful)
-    if flags.dtype != bool or flags.shape != (n_sequences,):
-        raise ValueError(
-            f"doubtful must be True or False for each of {counted(n_sequences, 'performance')}, as "
-            f"match.doubtful is; got {reprlib.repr(doubtful)}."
-        )
-    return flags

@@ -12,7 +12,7 @@ from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .arguments import AxesLike
 from .drawing import COLORS, WIDTH, legend_above, panels
-from .keyframes import own_keyframes
+from .time_axis import own_keyframes
 
 __all__ = ["TrellisDisplay"]
 

@@ -5,9 +5,8 @@ from contextlib import contextmanager
 import numpy as np
 
 from ..display.drawing import WIDTH, curves, front_line, group_styles, legend_above, panels, pyplot
-from ..display.keyframes import draw_keyframes, named_keyframes
 from ..display.synchronization import SynchronizationDisplay
-from ..display.time_axis import TimeAxis, clock_rate, offset_label
+from ..display.time_axis import TimeAxis, clock_rate, draw_keyframes, named_keyframes, offset_label
 
 __all__ = ["draw_offsets", "draw_signals", "own_figures"]
 
@@ -40,18 +39,16 @@ def draw_signals(trials, shown):
         The signals.
     """
     aligned, template = trials.aligned, trials.template
-    tells = trials.reasons is not None
+    n_frames = len(aligned.clock)
     display = SynchronizationDisplay(
         aligned.even[:, :, shown],
         aligned.curves[:, :, shown],
-        aligned.match.times,
+        aligned.match,
+        TimeAxis(aligned.unit, n_frames, [n_frames] * len(aligned.even), clock_rate(aligned.clock)),
         feature_names=[trials.signals[i] for i in shown],
         pattern=None if template is None else aligned.curves[template][:, shown],
         groups=trials.design.get("group"),
-        unit=aligned.unit,
-        frame_rate=clock_rate(aligned.clock),
         pattern_keyframes=_keyframes_of(aligned),
-        doubtful=aligned.match.doubtful if tells else None,
     ).plot(warps=False)
     left = display.axes_[0]
     left.title.set_text(left.get_title().replace("as recorded", "time-normalised"))
@@ -63,7 +60,7 @@ def draw_offsets(trials):
     """The offsets of all trials, and the mean of each group."""
     aligned = trials.aligned
     offsets, clock = aligned.offsets, aligned.clock
-    axis_of_time = TimeAxis(aligned.unit, len(clock), None, clock_rate(clock))
+    axis_of_time = TimeAxis.of_clock(aligned.unit, clock)
     figure, (axis,) = panels(None, [(0, 0)], 1, 1, (WIDTH, 3.4))
     names = list(trials.design.get("group", [""] * len(offsets)))
     styles = group_styles(names)

@@ -20,7 +20,7 @@ from ..display.bodies import (
     read_positions,
 )
 from ..display.drawing import COLORS
-from ..display.keyframes import check_own_keyframes
+from ..display.time_axis import check_own_keyframes
 from ..inputs.resampling import as_frame_rates
 from ..inputs.types import NamesLike, NumbersLike, Path, PerformancesLike, Table, ValuesLike
 from ..inputs.wording import counted

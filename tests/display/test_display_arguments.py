@@ -12,6 +12,7 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
+    Match,
     MotionTracker,
     OnlineSynchronizer,
     PartSynchronizer,
@@ -72,7 +73,7 @@ def refuses(call, message):
 
 
 def draw_synchronization(**arguments):
-    return SynchronizationDisplay.from_predictions(**({"X": X, "times": TIMES} | arguments))
+    return SynchronizationDisplay.from_predictions(**({"X": X, "match": TIMES} | arguments))
 
 
 @pytest.mark.parametrize(
@@ -82,9 +83,10 @@ def draw_synchronization(**arguments):
         ({"X": X[0]}, r"single 2-D input\. Wrap one performance as \[X\]"),
         ({"X": [*X[:3], masked(X[3])]}, "Performance 3 has masked values"),
         ({"X": [*X[:3], with_one(X[3], np.inf)]}, "Performance 3, frame 3, feature 1 is infinity"),
-        ({"times": TIMES[:2]}, r"each of the 4 performances; got \(2, 10\)"),
-        ({"times": TIMES + 1}, "times must be from 0 to P - 1 = 9"),
-        ({"times": BACKWARDS}, "times"),
+        ({"match": TIMES[:2]}, r"each of the 4 performances; got \(2, 10\)"),
+        ({"match": TIMES + 1}, "times must be from 0 to P - 1 = 9"),
+        ({"match": BACKWARDS}, "times"),
+        ({"match": Match(TIMES[:2])}, "2 performances"),
         ({"feature_names": list("abcd")}, "feature_names .* each of the 3 features, got 4"),
         *(({"feature_names": bad}, "feature_names must be a list of text")
           for bad in ("abc", 3, [["a"], ["b"], ["c"]])),
@@ -94,14 +96,6 @@ def draw_synchronization(**arguments):
         ({"features": []}, "at least one feature"),
         ({"pattern": PATTERN[:9]}, r"must have the shape \(10, 3\), got \(9, 3\)"),
         ({"pattern": masked(PATTERN)}, "The pattern has masked values"),
-        *(({"intervals": bad}, r"intervals must have shape \(2, 4, 10\): lower and upper bounds")
-          for bad in (TIMES, [TIMES], [TIMES[:2], TIMES[:2]], [TIMES, TIMES, TIMES], 0.9)),
-        ({"intervals": [TIMES, 11 * TIMES]}, "Performance 0: intervals must be .*, from 0 to 9"),
-        ({"intervals": [TIMES, BACKWARDS]}, "Performance 3: .* must not be above the upper one"),
-        ({"intervals": [TIMES, with_one(TIMES, np.nan)]}, "Performance 3: intervals must be"),
-        ({"intervals": ["low", "high"]}, "intervals"),
-        *(({"doubtful": bad}, "doubtful must be True or False for each of 4 performances, .*")
-          for bad in ([2], [0, 0, 1, 0], [True] * 3, True, "none", [[True]] * 4, [True, None] * 2)),
         *(({"coverage": bad}, "coverage must be a probability above 0 and below 1, .*; got")
           for bad in (0, 1, 90, "0.9", True, np.nan)),
         ({"ax": []}, r"ax must be Axes of matplotlib, got \[\]"),

@@ -104,7 +104,7 @@ def test_differences_in_signals_that_are_not_shown_are_named(pipe, found):
     assert "knee_flexion" in display.axes_[0].get_legend().get_title().get_text()
     wide = [np.repeat(x, 2, axis=1) for x in GAIT.data]
     display = GroupDisplay.from_estimator(pipe, TRIALS, **GIVEN, signals=wide)
-    assert display.note == "4 of 8 signals"
+    assert display.title.endswith("of people; 4 of 8 signals")
     assert len(display.axes_) == 5
 
 

@@ -39,13 +39,14 @@ def test_model_in_features_of_postures(bunch, pipe):
     names = list(pipe[0].get_feature_names_out())
     chosen = [names.index("left_leg_y"), names.index("pelvis_height")]
     postures = pipe[1].inverse_transform(pipe[-1].mean_)[:, chosen]
-    np.testing.assert_allclose(display.mean, postures, atol=1e-12)
+    (drawn,) = display.groups
+    np.testing.assert_allclose(drawn.mean, postures, atol=1e-12)
     assert display.performances_ == display.departures_ == []
     # The variance is that of postures: dimensions of the aSpace are correlated.
     postures = pipe[1].inverse_transform(pipe[:3].transform(bunch.data))[:, :, chosen]
     std = postures.std(axis=0)
-    np.testing.assert_allclose(display.upper - display.mean, 3 * std, atol=1e-9)
-    np.testing.assert_allclose(display.mean - display.lower, 3 * std, atol=1e-9)
+    np.testing.assert_allclose(drawn.upper - drawn.mean, 3 * std, atol=1e-9)
+    np.testing.assert_allclose(drawn.mean - drawn.lower, 3 * std, atol=1e-9)
 
 
 def legend_of(display):
@@ -77,14 +78,15 @@ def test_each_band_has_its_bounds_and_legend(bunch, pipe):
     }
     for band, ((lower, upper), holds, label) in expected.items():
         display = ActionModelDisplay.from_estimator(model, features=[1], band=band)
-        np.testing.assert_array_equal(display.lower, lower[:, [1]])
-        np.testing.assert_array_equal(display.upper, upper[:, [1]])
+        (drawn,) = display.groups
+        np.testing.assert_array_equal(drawn.lower, lower[:, [1]])
+        np.testing.assert_array_equal(drawn.upper, upper[:, [1]])
         title, text = legend_of(display)
         assert holds in title
         assert text == label
     for features in ("torso_z", "aspace0"):
         wide, narrow = (
-            ActionModelDisplay.from_estimator(pipe, features=features, band=band)
+            ActionModelDisplay.from_estimator(pipe, features=features, band=band).groups[0]
             for band in ("performances", "mean")
         )
         assert (wide.upper > narrow.upper).all()
@@ -96,14 +98,15 @@ def test_departures_are_the_parts_outside_the_band(bunch, pipe, band):
     still = np.repeat(bunch.data[0][:1], 40, axis=0)
     people, features = [*bunch.data[:3], still], ["pelvis_height", "torso_z"]
     display = ActionModelDisplay.from_estimator(pipe, people, features=features, band=band)
-    outside = (display.performances < display.lower) | (display.performances > display.upper)
+    (drawn,) = display.groups
+    outside = (drawn.performances < drawn.lower) | (drawn.performances > drawn.upper)
     assert outside[3].any()
     assert legend_of(display)[2] == outside.any(axis=(1, 2)).sum()
     for i, departures in enumerate(display.departures_):
         assert tuple(departures.get_colors()[0]) != tuple(display.performances_[i].get_colors()[0])
-        drawn = {(x, y) for piece in segments(departures) for x, y in piece.round(9) if x % 1 == 0}
+        pieces = {(x, y) for piece in segments(departures) for x, y in piece.round(9) if x % 1 == 0}
         seen = np.argwhere(outside[:, :, i])
-        assert drawn == {(p, display.performances[n, p, i].round(9)) for n, p in seen}
+        assert pieces == {(p, drawn.performances[n, p, i].round(9)) for n, p in seen}
     for options in ({"departures": False, "band": band}, {"band": "mean"}):
         assert ActionModelDisplay.from_estimator(pipe, people, **options).departures_ == []
 
@@ -130,7 +133,7 @@ def test_model_without_a_pipeline(bunch, pipe):
     model = ActionModel(n_std=2).fit(warped)
     display = ActionModelDisplay.from_estimator(model, warped[:2])
     assert display.feature_names == ["x0", "x1", "x2"]
-    assert display.performances.shape == (2, 30, 3)
+    assert display.groups[0].performances.shape == (2, 30, 3)
     with pytest.raises(ValueError, match="no feature 'pelvis_height'"):
         ActionModelDisplay.from_estimator(model, features="pelvis_height")
     with pytest.raises(ValueError, match="no feature 'knee'; there are 37: pelvis_height"):
@@ -153,15 +156,17 @@ def test_mean_and_band_of_each_group_are_those_of_its_own_model(bunch, pipe, ban
             "mean": model.mean_envelope(random_state=0),
         }[band]
         for drawn, expected in (
-            (display.mean, model.mean_),
-            (display.lower, lower),
-            (display.upper, upper),
+            (display.groups[k].mean, model.mean_),
+            (display.groups[k].lower, lower),
+            (display.groups[k].upper, upper),
         ):
-            np.testing.assert_allclose(drawn[k], expected[:, [1, 0]], atol=1e-12)
+            np.testing.assert_allclose(drawn, expected[:, [1, 0]], atol=1e-12)
         # The means are sorted by feature, then by group.
-        np.testing.assert_array_equal(display.mean_[3 + k].get_ydata(), display.mean[k, :, 1])
-    np.testing.assert_array_equal(display.mean[2], warped[8][:, [1, 0]])
-    assert np.isnan(display.lower[2]).all()
+        np.testing.assert_array_equal(
+            display.mean_[3 + k].get_ydata(), display.groups[k].mean[:, 1]
+        )
+    np.testing.assert_array_equal(display.groups[2].mean, warped[8][:, [1, 0]])
+    assert np.isnan(display.groups[2].lower).all()
     assert len(display.mean_) == len(display.performances_) == 6
     assert len(display.envelope_) == 4
     assert texts(display.axes_[0])[:3] == [
@@ -173,13 +178,12 @@ def test_mean_and_band_of_each_group_are_those_of_its_own_model(bunch, pipe, ban
 
 def test_default_band_of_groups_is_that_of_performances(bunch, pipe):
     alike = ActionModelDisplay.from_estimator(pipe, bunch.data, groups=["all"] * 9)
-    assert alike.band == "performances"
     assert "95 % of new people's trials" in legend_of(alike)[0]
     plain = ActionModelDisplay.from_estimator(
         pipe[-1], pipe[:3].transform(bunch.data), band="performances"
     )
-    np.testing.assert_allclose(alike.upper[0], plain.upper)
-    assert ActionModelDisplay.from_estimator(pipe).band == "points"
+    np.testing.assert_allclose(alike.groups[0].upper, plain.groups[0].upper)
+    assert "single poses" in legend_of(ActionModelDisplay.from_estimator(pipe))[0]
 
 
 def test_a_group_of_one_subject_has_no_band_of_performances(bunch, pipe):
@@ -196,12 +200,13 @@ def test_legend_counts_departures_from_the_band_of_the_own_group(bunch, pipe):
     display = ActionModelDisplay.from_estimator(
         pipe, X, groups=groups, band="points", features=["torso_z", "pelvis_height"]
     )
-    own = [["young", "old"].index(group) for group in groups]
-    of_young = display.performances[[group == "young" for group in groups]]
-    np.testing.assert_allclose(display.mean[0], of_young.mean(axis=0))
-    out = display.performances > display.upper[own]
-    out |= display.performances < display.lower[own]
-    label = f"outside the band of its group: {out.any(axis=(1, 2)).sum()} of them"
+    count = 0
+    for drawn, name in zip(display.groups, ["young", "old"], strict=True):
+        assert len(drawn.performances) == groups.count(name)
+        np.testing.assert_allclose(drawn.mean, drawn.performances.mean(axis=0))
+        out = (drawn.performances > drawn.upper) | (drawn.performances < drawn.lower)
+        count += out.any(axis=(1, 2)).sum()
+    label = f"outside the band of its group: {count} of them"
     assert label in texts(display.axes_[0])
 
 

@@ -123,7 +123,8 @@ def test_unknown_values_are_not_drawn(live):
     live.reset()
     for frames in zip(X[6], X[7], strict=False):
         live.step(frames)
-    assert repr(PhaseDisplay(live.history, live.n_frames_)) == "PhaseDisplay(2 performances)"
+    streams = PhaseDisplay.from_predictions(live.history, live.n_frames_)
+    assert repr(streams) == "PhaseDisplay(2 performances)"
     live.reset()
     rows = np.array([np.sin(np.linspace(0, size, 30)) for size in (3, 3.1, 3.2)])
     univariate = OnlineSynchronizer(LinearSynchronizer()).fit(rows)

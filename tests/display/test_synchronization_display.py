@@ -93,7 +93,8 @@ def test_pandas_output_is_drawn_as_arrays_are(bunch, pipe):
     for features in (None, ["pelvis_height"]):
         one = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features)
         other = ActionModelDisplay.from_estimator(framed, bunch.data, features=features)
-        np.testing.assert_allclose(one.performances, other.performances, atol=1e-12)
+        found, expected = (each.groups[0].performances for each in (other, one))
+        np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_from_predictions_draws_what_from_estimator_does(bunch, pipe):
@@ -288,32 +289,25 @@ def test_the_warps_of_whole_trials_of_parts_have_bands(bunch, pipe):
     check_bands(display, *sync.match(points).interval(0.9))
 
 
-def test_intervals_and_doubtful_trials_are_given_by_hand(bunch, pipe):
+def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch, pipe):
     points = pipe[:2].transform([*bunch.data[:8], twice(bunch.data[8])])
     match = pipe[2].match(points)
-    given = {"intervals": match.interval(0.9), "doubtful": match.doubtful}
-    one = SynchronizationDisplay.from_predictions(points, match.times, **given)
+    one = SynchronizationDisplay.from_predictions(points, match)
     other = SynchronizationDisplay.from_estimator(pipe[2], points)
     for found, expected in zip(segments(one.intervals_), segments(other.intervals_), strict=True):
         np.testing.assert_array_equal(found, expected)
     assert is_dotted(one.warps_) == is_dotted(other.warps_) == match.doubtful.tolist()
-    title = "warps; dashed: an even pace\nshaded: {}intervals; dotted: 1 doubtful trial"
-    assert one.axes_[-1].get_title() == title.format("")
-    assert other.axes_[-1].get_title() == title.format("90 % ")
-    named = SynchronizationDisplay.from_predictions(points, match.times, **given, coverage=0.9)
-    assert named.axes_[-1].get_title() == title.format("90 % ")
-    # Each without the other.
-    bands = SynchronizationDisplay.from_predictions(
-        points, match.times, intervals=np.array(given["intervals"])
-    )
-    assert len(segments(bands.intervals_)) == 9
-    assert not any(is_dotted(bands.warps_))
-    dots = SynchronizationDisplay.from_predictions(
-        points, match.times, doubtful=pd.Series(match.doubtful)
-    )
-    assert dots.intervals_ is None
-    assert dots.axes_[-1].get_title() == title.partition("shaded")[0] + "dotted: 1 doubtful trial"
-    assert is_dotted(dots.after_[0]) == match.doubtful.tolist()
+    title = "warps; dashed: an even pace\nshaded: {} % intervals; dotted: 1 doubtful trial"
+    assert one.axes_[-1].get_title() == other.axes_[-1].get_title() == title.format(90)
+    half = SynchronizationDisplay.from_predictions(points, match, coverage=0.5)
+    assert half.axes_[-1].get_title() == title.format(50)
+    for plain in (
+        SynchronizationDisplay.from_predictions(points, match, coverage=None),
+        SynchronizationDisplay.from_predictions(points, match.times),
+    ):
+        assert plain.axes_[-1].get_title() == title.partition("\n")[0]
+        assert plain.intervals_ is None
+        assert not any(is_dotted(plain.warps_))
 
 
 def test_many_bands_are_lighter_than_few(bunch, pipe):
