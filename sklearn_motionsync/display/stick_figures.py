@@ -11,13 +11,12 @@ import numpy as np
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
-from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
-from ..inputs.types import NumbersLike, PerformancesLike, RandomState
+from ..inputs.types import PerformancesLike, RandomState
 from ..inputs.wording import counted
 from ..matching.counting import whole
 from ..model.action_model import ActionModel
-from ..synchronizers.match import match_of_times
+from ..synchronizers.match import Match
 from ..utils.pipelines import (
     find_step,
     find_synchronizer,
@@ -60,13 +59,12 @@ _N_PERFORMANCES = 6
 class SkeletonDisplay:
     """Stick figures of joint positions: postures side by side, or performances in motion.
 
-    Make one with `from_positions` or `from_postures` (postures), `from_model` (Fig. 4),
-    `from_departures` (departures of a performance from an action), `from_performances`,
-    `from_estimator` or `from_predictions` (performances, also before and after synchronisation, to
-    `animate`). Left limbs are blue, right ones orange. Where limbs depart from an action these are
-    violet and all others grey. Bodies face the same way in the first frame, and their lowest joint
-    of all frames is on the floor. The view follows the pelvis of single postures, and of a body
-    that walks far.
+    Make one with `from_positions` (postures), `from_model` (Fig. 4), `from_departures` (departures
+    of a performance from an action), `from_performances` or `from_estimator` (performances, also
+    before and after synchronisation, to `animate`). Left limbs are blue, right ones orange. Where
+    limbs depart from an action these are violet and all others grey. Bodies face the same way in
+    the first frame, and their lowest joint of all frames is on the floor. The view follows the
+    pelvis of single postures, and of a body that walks far.
 
     A skeleton may lack landmarks. Where a landmark is the mean of joints, limbs are drawn between
     the landmarks; the joints of a skeleton without bones are drawn as points. Positions in a plane
@@ -185,57 +183,12 @@ class SkeletonDisplay:
         return display.plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
-    def from_postures(
-        cls,
-        X: PerformancesLike,
-        cosines: DirectionCosines,
-        *,
-        frames: int | Sequence[int] | np.ndarray = 6,
-        ax: AxesLike | None = None,
-        at: float = 0.0,
-        azimuth: float = -60,
-    ) -> Self:
-        """Draw postures given by their direction cosines.
-
-        Parameters
-        ----------
-        X : array-like, shape (n_frames, n_features), or (n_sequences, n_frames, n_features)
-            Postures.
-        cosines : DirectionCosines
-            Fitted: with the lengths of the limbs.
-        frames : int or list of int, default=6
-            The number of frames, evenly spaced from the first to the last, or their indices.
-        ax : Axes or array-like of Axes, default=None
-            See `plot`.
-        at : float in [0, 1], default=0.0
-            See `plot`.
-        azimuth : float, default=-60
-            See `plot`.
-
-        Returns
-        -------
-        SkeletonDisplay
-            The display, drawn.
-        """
-        if not hasattr(cosines, "inverse_transform"):
-            got = type(cosines).__name__
-            raise ValueError(f"cosines must be a fitted DirectionCosines, got {got}.")
-        X = as_performances(X)
-        if len(X) > 1 and all(len(x) > 1 for x in X):
-            X = cosines.inverse_transform(X)
-        else:
-            # Single postures are not accepted as a set of performances.
-            X = [cosines.inverse_transform(x) for x in X]
-        return cls.from_positions(
-            X, cosines.skeleton.body(), frames=frames, ax=ax, at=at, azimuth=azimuth
-        )
-
-    @classmethod
     def from_performances(
         cls,
         X: PerformancesLike,
         skeleton: Skeleton | None,
         *,
+        match: Match | None = None,
         names: Sequence[str] | None = None,
         ax: AxesLike | None = None,
         at: float = 0.0,
@@ -249,6 +202,9 @@ class SkeletonDisplay:
             Joint positions.
         skeleton : Skeleton or None
             None draws the joints as points without bones, y up.
+        match : Match, default=None
+            That of the performances, such as ``synchronizer.match(points)``: below them the same
+            ones are drawn aligned.
         names : list of str, default=None
             The names under the performances; by default their labels in X, or numbers.
         ax : Axes or array-like of Axes, default=None
@@ -263,57 +219,18 @@ class SkeletonDisplay:
         SkeletonDisplay
             The display, drawn at the beginning; see `animate`.
         """
-        bodies, labels = _side_by_side(X, skeleton, names)
-        display = cls([bodies], skeleton, ["each at its own pace"], labels=labels)
+        X = as_performances(X)
+        bodies = [place_on_floor(read_positions(x, skeleton, i), skeleton) for i, x in enumerate(X)]
+        names = labels_as_text(X) if names is None else names
+        labels = as_names(names, len(X), "names", "performances")
+        scenes, titles, durations = [bodies], ["each at its own pace"], None
+        if match is not None:
+            warped = match.warp([x.reshape(len(x), -1) for x in bodies])
+            scenes.append(list(warped.reshape(*warped.shape[:2], *bodies[0].shape[1:])))
+            titles, durations = ["as recorded", "aligned"], [[len(x) - 1 for x in bodies]]
+            durations.append([float(np.median(durations[0]))] * len(bodies))
+        display = cls(scenes, skeleton, titles, durations=durations, labels=labels)
         return display.plot(ax, at=at, azimuth=azimuth)
-
-    @classmethod
-    def from_predictions(
-        cls,
-        X: PerformancesLike,
-        times: NumbersLike,
-        skeleton: Skeleton | None,
-        *,
-        names: Sequence[str] | None = None,
-        ax: AxesLike | None = None,
-        at: float = 0.0,
-        azimuth: float = -60,
-    ) -> Self:
-        """Draw performances as recorded above the same ones synchronised by known warps.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_dims * n_joints)
-            Joint positions.
-        times : array-like, shape (n_sequences, P)
-            tau(p) from 0 to P - 1, such as ``synchronizer.match(points).times``.
-        skeleton : Skeleton or None
-            None draws the joints as points without bones, y up.
-        names : list of str, default=None
-            The names under the performances; by default their labels in X, or numbers.
-        ax : Axes or array-like of Axes, default=None
-            See `plot`.
-        at : float in [0, 1], default=0.0
-            See `plot`.
-        azimuth : float, default=-60
-            See `plot`.
-
-        Returns
-        -------
-        SkeletonDisplay
-            The display, drawn at the beginning; see `animate`.
-        """
-        bodies, labels = _side_by_side(X, skeleton, names)
-        warped = match_of_times(times, len(bodies)).warp([x.reshape(len(x), -1) for x in bodies])
-        warped = warped.reshape(*warped.shape[:2], *bodies[0].shape[1:])
-        durations = [len(x) - 1 for x in bodies]
-        return cls(
-            [bodies, list(warped)],
-            skeleton,
-            ["as recorded", "aligned"],
-            durations=[durations, [float(np.median(durations))] * len(bodies)],
-            labels=labels,
-        ).plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
     def from_estimator(
@@ -360,10 +277,10 @@ class SkeletonDisplay:
             pattern_first = sorted(range(len(match.times)), key=lambda i: i != pattern)
             performances = pattern_first[:_N_PERFORMANCES]
         performances = as_indices(performances, len(match.times), "performances")
-        return cls.from_predictions(
+        return cls.from_performances(
             [as_performances(X)[i] for i in performances],
-            match.times[performances],
             views[0].skeleton,
+            match=Match(match.times[performances]),
             names=[f"{i} (template)" if i == pattern else str(i) for i in performances],
             ax=ax,
             at=at,
@@ -414,7 +331,7 @@ class SkeletonDisplay:
             raise ValueError(
                 "Stick figures of a model need steps with inverse_transform before the "
                 f"synchronizer; they are {[type(step).__name__ for _, step in before.steps]}. Use "
-                "from_postures with postures of your own."
+                "from_positions with bodies of your own."
             )
         skeleton = views[0].skeleton.body()
         # Features that a synchronizer adds are not part of a posture.
@@ -710,14 +627,6 @@ def _time_line(axis):
 def postures_at(frames, performances):
     """Scenes of single postures: for each frame a panel with those of all performances."""
     return [[x[[frame]] for x in performances] for frame in frames]
-
-
-def _side_by_side(X, skeleton, names):
-    """Bodies on the floor that face forward, and their names."""
-    X = as_performances(X)
-    bodies = [place_on_floor(read_positions(x, skeleton, i), skeleton) for i, x in enumerate(X)]
-    names = labels_as_text(X) if names is None else names
-    return bodies, as_names(names, len(X), "names", "performances")
 
 
 def _segments(bodies, bones):

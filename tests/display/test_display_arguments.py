@@ -86,7 +86,7 @@ def draw_synchronization(**arguments):
         ({"match": TIMES[:2]}, r"each of the 4 performances; got \(2, 10\)"),
         ({"match": TIMES + 1}, "times must be from 0 to P - 1 = 9"),
         ({"match": BACKWARDS}, "times"),
-        ({"match": Match(TIMES[:2])}, "2 performances"),
+        ({"match": Match(TIMES[:2])}, "2 matched performances, but 4"),
         ({"feature_names": list("abcd")}, "feature_names .* each of the 3 features, got 4"),
         *(({"feature_names": bad}, "feature_names must be a list of text")
           for bad in ("abc", 3, [["a"], ["b"], ["c"]])),
@@ -204,15 +204,14 @@ def test_from_positions_refuses(arguments, message):
     ("arguments", "message"),
     [
         ({"names": ["a"]}, "names .* each of the 4 performances, got 1"),
-        ({"times": TIMES[:2]}, r"each of the 4 performances; got \(2, 10\)"),
-        ({"times": BACKWARDS}, "times"),
+        ({"match": Match(TIMES[:2])}, "2 matched performances, but 4"),
         ({"skeleton": 15}, "skeleton must be a Skeleton"),
         ({"X": [x[:, :9] for x in POSITIONS]}, "15 joints are"),
     ],
 )
-def test_skeleton_from_predictions_refuses(arguments, message):
-    arguments = {"X": POSITIONS, "times": TIMES, "skeleton": PAPER} | arguments
-    refuses(lambda: SkeletonDisplay.from_predictions(**arguments), message)
+def test_from_performances_refuses(arguments, message):
+    arguments = {"X": POSITIONS, "match": Match(TIMES), "skeleton": PAPER} | arguments
+    refuses(lambda: SkeletonDisplay.from_performances(**arguments), message)
 
 
 @pytest.mark.parametrize("performances", [[99], [-1], [0.5], [], "01", [True], [None], 4, {0}])
@@ -243,19 +242,6 @@ def test_from_model_needs_inverse_transform():
     refuses(lambda: SkeletonDisplay.from_model(pipe), message)
 
 
-def test_from_postures_accepts_tables_and_single_postures():
-    cosines = DirectionCosines(PAPER).set_output(transform="pandas")
-    table = cosines.fit_transform(pd.DataFrame(POSITIONS[0], columns=NAMES))
-    refuses(lambda: SkeletonDisplay.from_postures(table, None), "cosines must be a fitted")
-    faulty = np.array(table)
-    faulty[2, 1:4] = 0
-    refuses(
-        lambda: SkeletonDisplay.from_postures([np.array(table), faulty], cosines),
-        "Performance 1, frame 2: the limb 'hip' has no direction",
-    )
-    assert len(SkeletonDisplay.from_postures(np.array(table)[:3, None], cosines).axes_) == 6
-
-
 @pytest.mark.parametrize("arguments", [{"seconds": 0}, {"seconds": np.nan}, {"fps": -1}])
 def test_animate_refuses_impossible_durations(arguments):
     refuses(lambda: draw_positions().animate(**arguments), "seconds and fps must be above 0")
@@ -279,7 +265,7 @@ def test_joints_without_a_skeleton_are_points():
 
 
 def test_points_without_a_skeleton_are_synchronised_and_animated():
-    display = SkeletonDisplay.from_predictions(POSITIONS, TIMES, None, at=0.5)
+    display = SkeletonDisplay.from_performances(POSITIONS, None, match=Match(TIMES), at=0.5)
     assert [len(dots.get_xdata()) for dots in display.heads_] == [60, 60]
     assert display.animate(seconds=1, fps=2).to_jshtml().count("data:image/png") == 2
 

@@ -12,6 +12,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    Match,
     Skeleton,
 )
 from sklearn_motionsync.datasets import make_bending
@@ -152,15 +153,6 @@ def test_titles_name_the_frames(bunch):
         np.testing.assert_array_equal(bones_drawn(display, panel), bones_drawn(whole, frame))
 
 
-def test_from_postures_draws_the_bones_of_the_positions(bunch, pipe):
-    postures = pipe[0].transform(bunch.data)
-    display = SkeletonDisplay.from_postures(postures[2], pipe[0], frames=[0, 9])
-    strip = SkeletonDisplay.from_positions(bunch.data[2], bunch.skeleton, frames=[0, 9])
-    drawn, expected = (np.diff(bones_drawn(d, 1), axis=1) for d in (display, strip))
-    # The same bones in the heading of the first frame.
-    np.testing.assert_allclose(drawn, expected, atol=0.02)
-
-
 def test_from_model_draws_mean_and_accepted_postures(pipe):
     display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), n_samples=5, azimuth=0)
     titles = [axis.get_title() for axis in display.axes_]
@@ -190,13 +182,12 @@ def test_bodies_move_together_after_synchronisation(bunch, pipe):
     assert apart["synchronised"] < 0.02 < 0.2 < apart["raw"]
 
 
-def test_from_predictions_draws_what_from_estimator_does(bunch, pipe):
+def test_a_match_draws_what_from_estimator_does(bunch, pipe):
     points = pipe[:2].transform(bunch.data)
     times = pipe[2].match(points).times
     one = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[4, 1])
-    other = SkeletonDisplay.from_predictions(
-        [bunch.data[4], bunch.data[1]], times[[4, 1]], bunch.skeleton, names=["x", "y"]
-    )
+    X, match = [bunch.data[4], bunch.data[1]], Match(times[[4, 1]])
+    other = SkeletonDisplay.from_performances(X, bunch.skeleton, match=match, names=["x", "y"])
     for at in (0, 0.5, 1):
         one.plot(at=at)
         other.plot(at=at)
@@ -211,15 +202,14 @@ def test_the_view_follows_a_body_that_walks_far(bunch):
     for X in (staying, staying + drift):
         display = SkeletonDisplay.from_positions(X, bunch.skeleton, frames=[0, 30])
         strips.append([bones_drawn(display, panel) for panel in (0, 1)])
-        times = np.linspace(0, 39, 40)[np.newaxis]
-        display = SkeletonDisplay.from_predictions([X], times, bunch.skeleton, at=0.7)
+        display = SkeletonDisplay.from_performances([X], bunch.skeleton, at=0.7)
         moving.append(bones_drawn(display, 0))
     np.testing.assert_allclose(strips[0], strips[1], atol=1e-9)
     middle = np.abs(moving[1][:, :, 0]).max()
     assert middle < 1.5, "six metres away without following"
     # A body that stays is not followed: the feet stand still while the pelvis moves.
     feet = [j for j, name in enumerate(bunch.skeleton.joints) if name.endswith("ankle")]
-    raw = SkeletonDisplay.from_predictions([staying], times, bunch.skeleton).scenes[0][0]
+    raw = SkeletonDisplay.from_performances([staying], bunch.skeleton).scenes[0][0]
     assert np.ptp(raw[:, feet], axis=0).max() < 0.05 < np.ptp(raw[:, 0, [0, 2]], axis=0).max()
 
 
