@@ -185,7 +185,6 @@ CONSTANTS = [
         METRIC, "LONGEST_LAG", "longest lag of the autocorrelation", off=0.0, also=(REFINEMENT,)
     ),
     Constant(FILTERS, "_NOISE", "share of noise that is allowed", off=np.inf),
-    Constant(FILTERS, "_WIDEST", "widest smoothing of noise", off=1.0),
     Constant(FILTERS, "_ORDER", "order of the differences that are noise"),
     Constant(FILTERS, "LEAST_SIGMA", "narrowest Gaussian on frames", also=(REFINEMENT,)),
     Constant(SHARPENING, "_FINEST", "narrowest smoothing", off=0.001),

@@ -139,7 +139,8 @@ class SynchronizationDisplay:
         coverage: float | None = 0.9,
     ) -> None:
         self.before, self.after = [np.asarray(x) for x in before], np.asarray(after)
-        self.match, self.axis, self.feature_names = match, axis, feature_names
+        self.match, self.times = match, match.times
+        self.axis, self.feature_names = axis, feature_names
         self.pattern = None if pattern is None else np.asarray(pattern)
         self.pattern_index, self.coverage = pattern_index, coverage
         self.groups = None if groups is None else list(map(str, groups))

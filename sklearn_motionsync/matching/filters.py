@@ -22,9 +22,8 @@ _WIDE = 10
 LEAST_SIGMA = 0.35
 # Order of the differences whose variance is taken for that of white noise: docs/design.md.
 _ORDER = 6
-# Share of white noise in the energy of velocities of one feature that is small, and the widest
-# smoothing for it, as a share of the clip.
-_NOISE, _WIDEST = 0.01, 0.04
+# Share of white noise in the energy of velocities of one feature that is small.
+_NOISE = 0.01
 
 
 def smooth(on_clock, sigma, order=0):
@@ -128,16 +127,16 @@ def noise_width(positions):
     Returns
     -------
     float
-        In frames, at most 4 % of the clip; 0 if the noise is too small for any smoothing.
+        In frames, at most 9.3 % of the clip, of noise alone; 0 if the noise is too small for any
+        smoothing.
     """
-    widest = _WIDEST * (positions.shape[1] - 1)
     velocity = smooth(
         positions, max(FINE_SMOOTHING * (positions.shape[1] - 1), LEAST_SIGMA), order=1
     )
     energy = np.square(velocity).mean(axis=(0, 1))
     moves = energy > 0
     if not moves.any():
-        return widest
+        return 0.0
     share = (white_noise(positions)[moves] / energy[moves]).mean() / (4 * math.sqrt(math.pi))
     width = np.cbrt(share / (_NOISE * math.sqrt(moves.sum())))
-    return float(min(width, widest)) if width > LEAST_SIGMA else 0.0
+    return float(width) if width > LEAST_SIGMA else 0.0

@@ -63,7 +63,7 @@ class Page:
         from .. import __version__
 
         text = self.render(str(title), __version__)
-        # The file that a link leads to is replaced, and keeps who may read it.
+        # The file that a link leads to is replaced, and keeps its permissions.
         target = path.resolve()
         beside = target.with_name(f".{uuid.uuid4().hex}")
         try:
