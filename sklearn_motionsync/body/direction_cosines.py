@@ -217,7 +217,7 @@ class DirectionCosines(PositionsTransformer):
 
     def position_matrix(
         self, limb_lengths: ValuesLike | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, list[str]]:
         """The matrix of the linear map from postures to joint positions.
 
         The pelvis is at its height above the origin, and each joint at the end of its limb. That

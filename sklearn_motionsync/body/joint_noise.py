@@ -112,10 +112,10 @@ class JointNoise:
         order = [LANDMARKS.index(name) for name in body.joints]
         again = DirectionCosines(body, self.cosines.reference).fit([positions])
         (exact,) = again.transform([positions])
-        moments = 0.0
+        moments = np.zeros((width, width))
         for _ in range(_DRAWS):
             size = len(positions), skeleton.n_dims * len(skeleton.joints)
             moved = landmark_positions(self.sd * rng.standard_normal(size), skeleton)[:, order]
             (found,) = again.transform([positions + moved.reshape(positions.shape)])
-            moments = moments + (found - exact).T @ (found - exact)
+            moments += (found - exact).T @ (found - exact)
         return moments / (_DRAWS * len(positions))

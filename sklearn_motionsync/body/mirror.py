@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -76,7 +77,8 @@ def mirror(X: PerformancesLike, skeleton: Skeleton) -> Transformed:
     # One array of several performances is mirrored as a whole.
     whole = isinstance(X, pd.DataFrame) or getattr(X, "ndim", 1) == 3
     one = whole or as_collection(X) is None
-    parts = [X] if one else list(X)
+    sequences: Any = [X] if one else X
+    parts = list(sequences)
     if not parts:
         raise ValueError("Found 0 performances (n_samples=0); there is nothing to mirror.")
     arrays = [_as_positions(x, skeleton, i) for i, x in enumerate(parts)]

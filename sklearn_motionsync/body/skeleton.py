@@ -176,10 +176,10 @@ class Skeleton:
     # In files the landmarks are a plain dict.
 
     def __getstate__(self):
-        return vars(self) | {"landmarks": dict(self.landmarks)}
+        return self.__dict__ | {"landmarks": dict(self.landmarks)}
 
     def __setstate__(self, state):
-        vars(self).update(state, landmarks=_ReadOnly(state["landmarks"]))
+        self.__dict__.update(state, landmarks=_ReadOnly(state["landmarks"]))
 
     def __repr__(self):
         for name in FORMATS:
@@ -251,14 +251,16 @@ class Skeleton:
         names = _as_joints(attrs.get("joints", ()))
         # Renamed columns are not joints of the file.
         guess = guess_landmarks(joints, names if set(joints) <= set(names) else ())
-        landmarks = _check_landmarks(add_midpoints(guess | given), given, joints)
+        all_landmarks = _check_landmarks(add_midpoints(guess | given), given, joints)
         parents = _nearest_parents(joints, names, _as_parents(attrs.get("parents", ())))
-        held = {joint for at in landmarks.values() for joint in as_tuple(at)}
+        held = {joint for at in all_landmarks.values() for joint in as_tuple(at)}
         parents = _without_still_roots(df, joints, parents, held)
         up = attrs.get("up") if up is None else up
-        skeleton = cls(joints, parents, landmarks, "y" if up is None else up, n_dims)
+        skeleton = cls(joints, parents, all_landmarks, "y" if up is None else up, n_dims)
         estimate = _estimate_up(df, skeleton) if up is None else None
-        return skeleton if estimate is None else cls(joints, parents, landmarks, estimate, n_dims)
+        return (
+            skeleton if estimate is None else cls(joints, parents, all_landmarks, estimate, n_dims)
+        )
 
     def index_of(self, landmark: str) -> int:
         """Index of the joint at a landmark.

@@ -76,7 +76,7 @@ class GroupComparison:
     n_units: int
     level: float
     design: str
-    unit: str
+    unit: Unit
 
     def __repr__(self):
         return f"GroupComparison({self.describe()!r})"

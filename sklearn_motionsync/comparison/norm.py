@@ -90,7 +90,7 @@ class NormComparison:
     profile: pd.DataFrame
     level: float
     n_people: int
-    unit: str
+    unit: Unit
     clock: np.ndarray
     features: list
     units: list

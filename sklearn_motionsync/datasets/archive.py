@@ -4,7 +4,7 @@ import math
 import sys
 import warnings
 import zipfile
-from pathlib import Path
+from pathlib import Path as FilePath
 
 import numpy as np
 from numpy.lib import format as npy
@@ -12,6 +12,7 @@ from sklearn.utils import Bunch
 
 from ..body.skeleton import Skeleton, find_cycle
 from ..inputs.numbers import check_finite
+from ..inputs.types import Path
 from ..io.text import check_result_size
 
 _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "parents")
@@ -67,7 +68,7 @@ def load_performances(path: Path) -> Bunch:
     >>> bunch.data[0].shape, bunch.target[0]
     ((7, 60), np.str_('bow'))
     """
-    path = Path(path)
+    path = FilePath(path)
     if not path.is_file():
         raise FileNotFoundError(f"There is no archive at {path}; give the path of a .npz file.")
     fields = _read_arrays(path)

@@ -138,17 +138,17 @@ def make_bending(
     amount = f"{counted(n_performances, 'performance')} of about {n_frames} frames"
     n_numbers = n_performances * n_frames * 45
     check_size("make_bending", amount, n_numbers, "n_performances or n_frames")
-    random_state = check_random_state(random_state)
-    actors = [_draw_actor(random_state, style) for _ in range(n_actors)]
+    rng = check_random_state(random_state)
+    actors = [_draw_actor(rng, style) for _ in range(n_actors)]
     moments = np.array(list(_KEYFRAMES.values()))
     data, times, keyframes = [], [], []
     for i in range(n_performances):
-        length = whole(n_frames * random_state.uniform(0.75, 1.25))
-        phase = _draw_warp(random_state, length, warp)
+        length = whole(n_frames * rng.uniform(0.75, 1.25))
+        phase = _draw_warp(rng, length, warp)
         lengths, angles = actors[i % n_actors]
-        positions = _animate(phase, lengths, _vary(random_state, 0.3 * style, angles))
-        positions = _place(random_state, positions)
-        positions += noise * random_state.standard_normal(positions.shape)
+        positions = _animate(phase, lengths, _vary(rng, 0.3 * style, angles))
+        positions = _place(rng, positions)
+        positions += noise * rng.standard_normal(positions.shape)
         data.append(positions.reshape(length, -1))
         times.append(phase)
         keyframes.append(np.interp(moments, phase, np.arange(length)))

@@ -4,7 +4,7 @@ import hashlib
 import time
 from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
-from pathlib import Path
+from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
 
 import numpy as np
@@ -12,6 +12,7 @@ from sklearn.utils import Bunch
 from sklearn.utils._param_validation import Interval
 
 from ..body.skeleton import Skeleton
+from ..inputs.types import Path
 from ..io.motion import read_motion
 from ..utils.parameters import validated_function
 
@@ -122,7 +123,7 @@ def fetch_cmu(
     takes = [_two_digits(trial, "trials") for trial in np.atleast_1d(trials).tolist()]
     if not takes:
         raise ValueError("trials must be one number or several, got none.")
-    folder = Path(get_data_home(data_home)) / "cmu_mocap" / subject
+    folder = FilePath(get_data_home(data_home)) / "cmu_mocap" / subject
     names = [f"{subject}.asf", *(f"{subject}_{take}.amc" for take in takes)]
     checksums = sha256 or {}
     new = []
@@ -154,7 +155,7 @@ def fetch_cmu(
     )
 
 
-def _two_digits(number, name):
+def _two_digits(number: int | str, name: str) -> str:
     text = str(number)
     # The number becomes part of a path, so it must be a number.
     if not (text.isascii() and text.isdigit() and len(text) <= 4 and int(text)):
@@ -179,7 +180,7 @@ def _download(address, path, sha256, n_retries, delay):
     """Fetch one file. It gets its name only when it is complete and has the right checksum."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix="download_", dir=path.parent) as folder:
-        fetched = _try(address, Path(folder) / path.name, path, n_retries, delay)
+        fetched = _try(address, FilePath(folder) / path.name, path, n_retries, delay)
         if not _is_valid(fetched, sha256):
             checksum = hashlib.sha256(fetched.read_bytes()).hexdigest()
             raise OSError(

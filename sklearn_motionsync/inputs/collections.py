@@ -15,7 +15,7 @@ precision is refused.
 """
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from numbers import Number
 from os import PathLike
 
@@ -87,8 +87,15 @@ class Performances(tuple):
         How sure it is what was seen, if that is given.
     """
 
-    facts = ()
-    weights = confidence = None
+    kind: str
+    labels: list
+    frames: Sequence
+    names: Sequence[str] | None
+    levels: tuple[str, ...]
+    numbers: Sequence[int]
+    facts: Sequence[dict] = ()
+    weights: list[np.ndarray] | None = None
+    confidence: list[np.ndarray] | None = None
 
     def __new__(cls, arrays, kind, labels, frames=(), names=None, levels=INDEX_NAMES, numbers=None):
         self = super().__new__(cls, arrays)

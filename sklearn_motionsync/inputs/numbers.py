@@ -51,7 +51,7 @@ _ADVICE = "Interpolate the gap, as by sklearn_motionsync.io.fill_gaps(x, max_gap
 _FILE = re.compile(r".*\.[a-z]\w{1,4}", re.IGNORECASE | re.DOTALL)
 
 
-def as_numbers(values, what, *, dtype=None):
+def as_numbers(values, what, *, dtype=None) -> np.ndarray:
     """Convert an array-like to an array of real numbers in single or double precision.
 
     Parameters

@@ -65,7 +65,8 @@ class SequenceLevelMixin:
     """Input checks of estimators whose samples are whole performances."""
 
     # How `check_performances` treats NaN; "allow-nan" admits gaps.
-    _finite = True
+    _finite: bool | str = True
+    n_features_in_: int
 
     def check_performances(self, X: PerformancesLike) -> Performances:
         """Check performances against the input contract, and against those of ``fit``.
@@ -97,7 +98,7 @@ class SequenceLevelMixin:
 
     def _read_rows_in_fit(self):
         """Whether it was fitted on 2-D input; an error if it was not fitted."""
-        on_rows = vars(self).get("_fitted_on_rows")
+        on_rows = self.__dict__.get("_fitted_on_rows")
         # After a fit that failed its input is known, and nothing else.
         is_fitted = getattr(self, "__sklearn_is_fitted__", None)
         if on_rows is None or (is_fitted is not None and not is_fitted()):

@@ -1,16 +1,19 @@
 """Files of motion capture: `read_motion`, and the registry of the readers of all formats."""
 
+from __future__ import annotations
+
 import inspect
 import os
 import warnings
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Callable, Iterable
+from pathlib import Path as FilePath
 from typing import Any, Literal
 
 import pandas as pd
 
 from ..inputs.numbers import listed
 from ..inputs.tables import FRAME
+from ..inputs.types import Path
 from ..inputs.wording import counted
 from .acclaim import read_acclaim
 from .bvh import read_bvh
@@ -37,7 +40,7 @@ from .trc import read_trc
 # - whatever else goes into ``attrs``, as plain Python types.
 #
 # A file that is damaged or not complete is a ValueError that begins with its path.
-READERS = {
+READERS: dict[str, Callable[..., dict]] = {
     ".bvh": read_bvh,
     ".amc": read_acclaim,
     ".c3d": read_c3d,
@@ -200,17 +203,17 @@ def read_motion(
     check_max_gap(max_gap)
     check_ends(ends)
     check_frame_rate(frame_rate)
-    several = not isinstance(path, (str, os.PathLike))
-    if columns not in (None, "common") or (columns and not several):
+    if columns not in (None, "common") or (columns and isinstance(path, (str, os.PathLike))):
         raise ValueError(
             "columns must be None, or 'common' with a list of several files, got "
             f"columns={columns!r} for {path!r}."
         )
-    if several:
-        options = {"asf": asf, "frame_rate": frame_rate, "max_gap": max_gap, "ends": ends}
-        recordings = _read_several(path, options | {"group": group})
+    options: dict[str, Any] = {"asf": asf, "group": group}
+    if not isinstance(path, (str, os.PathLike)):
+        options |= {"frame_rate": frame_rate, "max_gap": max_gap, "ends": ends}
+        recordings = _read_several(path, options)
         return _keep_common(recordings) if columns else recordings
-    path = Path(path)
+    path = FilePath(path)
     if not path.is_file():
         raise FileNotFoundError(f"There is no motion file at {path}.")
     reader = READERS.get(path.suffix.lower())
@@ -219,7 +222,6 @@ def read_motion(
             f"{path} ends with {path.suffix!r}, which no reader is for; the known endings are "
             f"{_join(READERS)}."
         )
-    options = {"asf": asf, "group": group}
     options = {name: value for name, value in options.items() if value is not None}
     for name, value in options.items():
         endings = [end for end in READERS if name in inspect.signature(READERS[end]).parameters]
@@ -263,8 +265,8 @@ def _read_several(paths, options):
             refused.append(error)
     if not recordings:
         raise refused[0] if refused else ValueError("There are no files to read, got none.")
-    for error in refused:
-        warnings.warn(f"{error} The file is left out.", UserWarning, stacklevel=3)
+    for missing in refused:
+        warnings.warn(f"{missing} The file is left out.", UserWarning, stacklevel=3)
     return recordings
 
 

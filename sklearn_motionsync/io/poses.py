@@ -108,7 +108,8 @@ def from_poses(
             )
         _, confidence = _arrange(confidence, "confidence", _DIMENSIONS[:3])
         values[np.broadcast_to(confidence < min_confidence, values.shape[:3])] = np.nan
-    facts = {"format": "poses", "units": None, "up": "-y" if len(axes) == 2 else None}
+    up = "-y" if len(axes) == 2 else None
+    facts: dict[str, Any] = {"format": "poses", "units": None, "up": up}
     times, unit, fps = _read_times(position, attrs)
     if times is None:
         facts["frame_rate"] = fps if frame_rate is None else float(frame_rate)

@@ -34,21 +34,21 @@ class KeyframeColumns(NamedTuple):
 
     Attributes
     ----------
-    count : int
+    n_columns : int
     std : float
         Standard deviation of the key-frames as given, as a share of the clip; 0 for exact ones.
     """
 
-    count: int
+    n_columns: int
     std: float
 
     def features(self, columns):
         """Columns (..., n_columns) without those of key-frames."""
-        return columns[..., : -self.count]
+        return columns[..., : -self.n_columns]
 
     def ramps(self, columns):
         """The columns of key-frames."""
-        return columns[..., -self.count :]
+        return columns[..., -self.n_columns :]
 
     def on_clock(self, n_frames, energy):
         """The `Anchors` of a clock, for features of this mean squared norm."""

@@ -24,12 +24,13 @@ class Median(NamedTuple):
 
     Attributes
     ----------
-    index : int
+    trial : int
+        Its index.
     distances : ndarray, shape (n_trials,)
         ``C_n`` of Eq. 19, or its estimate, of every trial.
     """
 
-    index: int
+    trial: int
     distances: np.ndarray
 
 

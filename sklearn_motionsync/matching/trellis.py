@@ -97,7 +97,7 @@ class Trellis:
         self.unseen = unseen
         self.reach, self.anchors = max_disparity, anchors
         # The columns of features, behind which are one of weights and those of key-frames.
-        n_keyframes = 0 if anchors is None else anchors.columns.count
+        n_keyframes = 0 if anchors is None else anchors.columns.n_columns
         self.weight_column = None if unseen is None else -1 - n_keyframes
         n_beside = n_keyframes + (unseen is not None)
         self.plain = slice(None, -n_beside if n_beside else None)

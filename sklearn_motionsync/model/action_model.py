@@ -183,7 +183,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
                     f"{learnt['_unseen']}. Give more performances, leave out the feature, or fill "
                     "gaps before, as by fill_gaps of sklearn_motionsync.io."
                 )
-        vars(self).update(learnt)
+        self.__dict__.update(learnt)
         return self
 
     @validated
@@ -247,7 +247,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         else:
             performances = self._check_seen(_check_lengths(self._check_training_set(X)))
             stream = PerformanceStream.starting_at(performances[0])
-        vars(self).update(self._learn(stream, performances, groups))
+        self.__dict__.update(self._learn(stream, performances, groups))
         return self
 
     @property

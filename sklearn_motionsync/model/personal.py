@@ -4,7 +4,7 @@ import numpy as np
 
 from ..matching.gaps import fill_with_mean
 from ..utils.groups import mean_of_others, sums_of_groups
-from .similarity import LogMoments, Neighbours, learn_weights, log_moments
+from .similarity import Neighbours, learn_weights, log_moments
 from .variation import within_variance
 
 __all__ = ["PersonalReference"]
@@ -62,7 +62,7 @@ class PersonalReference:
             if len(others):
                 near = self._near(kept[others], of_others[i])
                 self.held_out[i] = near.dissimilarity(kept[[i]])[0]
-        self.moments: LogMoments = log_moments(self.held_out[np.isfinite(self.held_out)])
+        self.moments = log_moments(self.held_out[np.isfinite(self.held_out)])
 
     def dissimilarity(self, performances):
         """Dissimilarity of performances to the most similar own one, (n,)."""

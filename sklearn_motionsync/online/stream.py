@@ -549,7 +549,7 @@ def time_left(share, elapsed, duration):
     return (1 - share) * by_time + share * duration * (1 - share)
 
 
-def check_observations(x, what, names, width, ndims=(1,)):
+def check_observations(x, what, names, width, ndims=(1,)) -> np.ndarray:
     """The numbers of a frame or of a take, checked.
 
     Parameters

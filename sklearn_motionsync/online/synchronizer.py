@@ -182,6 +182,8 @@ class OnlineSynchronizer(
         "cyclic": ["boolean"],
     }
 
+    _session: Session | None
+
     def __init__(
         self,
         synchronizer: Synchronizer | None = None,
@@ -229,7 +231,7 @@ class OnlineSynchronizer(
         """
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         performances = self._check_training_set(X)
-        metadata = {} if keyframes is None else {"keyframes": keyframes}
+        metadata: dict[str, Any] = {} if keyframes is None else {"keyframes": keyframes}
         with self._progress(fits=True) as progress:
             with progress.fitting(sync, "synchronizing"):
                 sync.fit(X, y, **metadata)
@@ -285,7 +287,7 @@ class OnlineSynchronizer(
             as many streams as in the frames before, or time does not increase, by 1e-9 to 1e9
             frames. The performance then goes on as if the frame had not been given.
         """
-        if "_session" not in vars(self):
+        if "_session" not in self.__dict__:
             check_is_fitted(self, "mean_")
         width = self.mean_.shape[1]
         frame = check_observations(frame, "The frame", names_of_input(self), width, (1, 2))
@@ -311,7 +313,8 @@ class OnlineSynchronizer(
         if stream is None:
             self._session = None
             return
-        n_streams = 0 if self._session is None else self._session.n_streams
+        session = self._session
+        n_streams = 0 if session is None else session.n_streams
         streams = np.atleast_1d(stream)
         known = streams.dtype.kind in "iu" and np.isin(streams, np.arange(-n_streams, n_streams))
         if streams.ndim > 1 or (len(streams) and not np.all(known)):
@@ -319,8 +322,9 @@ class OnlineSynchronizer(
                 f"stream={stream!r} is not among {counted(n_streams, 'running performance')}: give "
                 "an index of these or several, or None for all."
             )
-        for n in streams:
-            self._session.restart(int(n))
+        if session is not None:
+            for n in streams:
+                session.restart(int(n))
 
     def time_left(self) -> Any:
         """Estimate the time until the performance ends, or the cycle that runs.
@@ -386,8 +390,8 @@ class OnlineSynchronizer(
             facts=None if times is None else TIMELESS,
             timed=times is not None,
         )
-        tracks, times = [], times_of_each(times, len(performances))
-        for i, (x, t) in enumerate(zip(performances, times, strict=True)):
+        tracks, times_of = [], times_of_each(times, len(performances))
+        for i, (x, t) in enumerate(zip(performances, times_of, strict=True)):
             t = check_times(t, len(x), self.frame_rate, performances.called(i))
             frames = x.astype(np.float64)
             session = Session(self._reference, frames[0], t[0])
@@ -589,7 +593,7 @@ def calibrate(reference_of, performances, warped, times, progress):
     """
     n, total = len(performances), warped.sum(axis=0, dtype=np.float64)
     chosen = np.unique(np.linspace(0, n - 1, _MAX_PERFORMANCES).round().astype(np.intp))
-    scores, shares, largest = *np.zeros((2, len(_TEMPERATURES))), []
+    (scores, shares), largest = np.zeros((2, len(_TEMPERATURES))), []
     # Of a constant mean all costs are 0, in any unit.
     whole = reference_of(total / n)
     energy = float(np.square(whole.moving).sum(axis=1).mean()) or 1.0

@@ -165,6 +165,8 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         "random_state": ["random_state"],
     }
 
+    _running: RunningTake | None
+
     def __init__(
         self,
         synchronizer: BaseEstimator | None = None,

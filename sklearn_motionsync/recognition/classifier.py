@@ -409,18 +409,20 @@ class ActionClassifier(
             raise ValueError(
                 f"The class {label!r} has one performance: a model needs at least two."
             )
-        own, names = [performances[i] for i in members], getattr(self, "feature_names_in_", None)
+        X: PerformancesLike
+        X = arrays = [performances[i] for i in members]
+        names = getattr(self, "feature_names_in_", None)
         if self._fitted_on_rows:
-            own = np.stack([x[:, 0] for x in own])
+            X = np.stack([x[:, 0] for x in arrays])
         elif names is not None:
-            own = [pd.DataFrame(x, columns=names) for x in own]
+            X = [pd.DataFrame(x, columns=names) for x in arrays]
         if groups is not None:
             groups = groups[members] if len(np.unique(groups[members])) > 1 else None
         synchronizer = DenseSynchronizer(self.n_frames, n_jobs=self.n_jobs)
         with warnings.catch_warnings():
             # One class may move one feature only; units are a matter of all classes.
             warnings.filterwarnings("ignore", ".* of the energy that is compared", UserWarning)
-            synchronised = synchronizer.fit_transform(own)
+            synchronised = synchronizer.fit_transform(X)
         model = ActionModel().fit(synchronised, groups=groups)
         return Pipeline([("densesynchronizer", synchronizer), ("actionmodel", model)])
 

@@ -202,15 +202,15 @@ def find_performances(
                 "before the synchronizer, so frames of hits are unknown. Resample the takes first."
             )
     dissimilarity = WindowDissimilarity(synchronizer, groups, length=durations is None)
-    learns = threshold is None or threshold == "auto"
-    limit = dissimilarity.threshold(coverage) if learns else -np.log(max(threshold, _NO_SCORE))
+    fixed = None if threshold is None or threshold == "auto" else max(threshold, _NO_SCORE)
+    limit = dissimilarity.threshold(coverage) if fixed is None else -np.log(fixed)
     hopeless = float(np.exp(-_HOPELESS * limit))
     proposers = {
         pace: Proposer.of(synchronizer, *_check_durations(synchronizer, durations, pace))
         for pace in set(paces)
     }
     sizes = [proposers[pace].n_portions(len(x)) for pace, x in zip(paces, takes, strict=True)]
-    rows = []
+    hits_of_all = []
     with Progress(checker, verbose) as progress:
         step = progress.stage("searching", 2 * sum(sizes))
         for i, (take, pace, size) in enumerate(zip(takes, paces, sizes, strict=True)):
@@ -219,14 +219,14 @@ def find_performances(
             lowest = 0.0 if threshold is None else hopeless
             hits = search.hits(propose(take, step), lowest, step, size)
             level = threshold
-            if learns:
+            if fixed is None:
                 u = -np.log([hit.score for hit in hits if hit.proposed >= hopeless])
                 level = float(np.exp(-dissimilarity.threshold_of_take(limit, u, len(take))))
             best = best_hits(hits, 0.0 if threshold is None else level, max_hits)
             found = in_frames_given(best, pace, len(given[i]), durations)
-            rows += [(i, *hit, level) for hit in found]
+            hits_of_all += [(i, *hit, level) for hit in found]
     types = {"take": int, "start": int, "stop": int, "score": float, "threshold": float}
-    rows = pd.DataFrame(rows, columns=list(types)).astype(types)
+    rows = pd.DataFrame(hits_of_all, columns=list(types)).astype(types)
     if threshold is not None and rows.empty and not known:
         how = {"threshold": threshold, "coverage": coverage, "durations": durations}
         _warn_of_other_rates(pattern, X, how | {"groups": groups_given})

@@ -98,10 +98,11 @@ class AnchoredSynchronizer(Synchronizer):
             elif frame_rate is not None:
                 as_frame_rates(frame_rate)
             learnt = self._learn(training, progress)
-        vars(self).update(learnt)
+        self.__dict__.update(learnt)
         return training
 
-    def fit_transform(
+    # scikit-learn's takes whatever ``fit`` takes, without its name.
+    def fit_transform(  # type: ignore[override]
         self,
         X: PerformancesLike,
         y: object = None,
@@ -129,8 +130,8 @@ class AnchoredSynchronizer(Synchronizer):
         ndarray, shape (n_sequences, P, n_features)
             As from ``transform``.
         """
-        params = {"keyframes": keyframes, "frame_rate": frame_rate, "confidence": confidence}
-        return self.fit(X, y, **params).transform(X, **params)
+        self.fit(X, y, keyframes, frame_rate, confidence)
+        return self.transform(X, keyframes, frame_rate, confidence)
 
     def transform(
         self,
@@ -138,6 +139,7 @@ class AnchoredSynchronizer(Synchronizer):
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
         confidence: Indexed[NumbersLike] | None = None,
+        *,
         fill: Literal["model"] | None = None,
     ) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).

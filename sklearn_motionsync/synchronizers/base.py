@@ -163,10 +163,12 @@ class Synchronizer(
         """
         with self._progress(fits=True) as progress:
             learnt = self._learn(self._read_training_set(X), progress)
-        vars(self).update(learnt)
+        self.__dict__.update(learnt)
         return self
 
-    def transform(self, X: PerformancesLike, fill: Literal["model"] | None = None) -> Transformed:
+    def transform(
+        self, X: PerformancesLike, *, fill: Literal["model"] | None = None
+    ) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).
 
         Parameters
@@ -377,11 +379,11 @@ class Synchronizer(
         """
         median = linear_median(comparable) if isinstance(pattern, str) else None
         if median is not None:
-            median = Median(median.index, median.distances * clock.unit.size**2)
+            median = Median(median.trial, median.distances * clock.unit.size**2)
         chosen = pattern_of(training, pattern, median)
         return {
             "pattern_": normalise([chosen.array], clock.n_frames)[0],
-            "pattern_index_": chosen.index,
+            "pattern_index_": chosen.trial,
             "n_frames_": clock.n_frames,
             "global_distances_": chosen.distances,
             "lengths_": clock.lengths,

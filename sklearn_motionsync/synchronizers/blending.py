@@ -218,7 +218,7 @@ def _check(sequences, arrays, skeleton):
             check_names(x, names, f"Performance {i}")
 
 
-def _weights(given, labels, n_frames, what):
+def _weights(given, labels, n_frames, what) -> np.ndarray:
     """Weights (n_frames, n_sequences) of sum 1 at each frame of the clock."""
     if isinstance(given, (pd.Series, Mapping)):
         row = np.zeros(len(labels))

@@ -344,7 +344,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         >>> DenseSynchronizer.paper(n_frames=100)
         DenseSynchronizer(consensus=0, cost='posture', max_rate=2, n_frames=100)
         """
-        return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0} | params)
+        return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0, **params})
 
     def _read_training_set(self, X, confidence=None):
         sample, numbers, population = draw_sample(X, self.max_fit, self.pattern, self.random_state)
@@ -391,7 +391,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         metric, keyframes = compared.metric, vote.keyframes
         return {
             "pattern_": normalise([chosen.array], clock.n_frames)[0],
-            "pattern_index_": None if chosen.index is None else int(numbers[chosen.index]),
+            "pattern_index_": None if chosen.trial is None else int(numbers[chosen.trial]),
             "n_frames_": clock.n_frames,
             "global_distances_": distances,
             "sample_": numbers,

@@ -50,23 +50,24 @@ class Intervals:
     """
 
     def __init__(self, times: np.ndarray, measure: Callable[[], Measured]) -> None:
-        self.times, self._measure, self._found = times, measure, None
+        self.times, self._measure = times, measure
+        self._measured: Measured | None = None
         self._lock = threading.Lock()
 
     def __getstate__(self):
         return self.times, self.measured()
 
     def __setstate__(self, state):
-        self.times, self._found = state
+        self.times, self._measured = state
         self._lock = threading.Lock()
 
     def measured(self) -> Measured:
         """What is known of the performances, which are not needed any more."""
         with self._lock:
-            if self._found is None:
-                self._found = self._measure()
+            if self._measured is None:
+                self._measured = self._measure()
                 del self._measure
-            return self._found
+            return self._measured
 
     def bounds(self, coverage: float) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper times, (n_sequences, P) each, non-decreasing and inside the clip."""

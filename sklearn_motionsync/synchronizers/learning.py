@@ -179,7 +179,7 @@ def match_pairs(clock, step, wanted, *, trials, names, random_state, n_jobs, pro
         # Sums over fewer frames, scaled to all, in the unit of the data.
         scale = clock.n_frames / (searched.frames or clock.n_frames)
         distances = features.back(median.distances) * scale
-        median = Median(median.index, distances)
+        median = Median(median.trial, distances)
     return PairsStep(matcher, median)
 
 
@@ -258,8 +258,8 @@ def let_exemplars_vote(clock, training, pattern, pairs, consensus):
     source = pattern.array
     if clock.weighs:
         weights = np.ones(len(source))
-        if pattern.index is not None:
-            weights = training.trials.weights[pattern.index]
+        if pattern.trial is not None:
+            weights = training.trials.weights[pattern.trial]
         source = add_weights([source], [weights])[0]
 
     def warper_to(array):
@@ -272,8 +272,8 @@ def let_exemplars_vote(clock, training, pattern, pairs, consensus):
     if training.keyframes is None:
         return VoteStep(exemplars, warper_to(source), None)
     keyframes = np.full(training.keyframes.shape[1], np.nan)
-    if pattern.index is not None:
-        keyframes = training.keyframes[pattern.index]
+    if pattern.trial is not None:
+        keyframes = training.keyframes[pattern.trial]
     unknown = np.isnan(keyframes)
     if unknown.any():
         # Of every one the first trials that know it.
@@ -299,9 +299,9 @@ def _choose_exemplars(training, pattern, median, consensus):
     candidates = np.arange(n_trials)
     if training.keyframes is not None:
         has_some = np.isfinite(training.keyframes).any(axis=1)
-        if has_some[candidates != pattern.index].sum() >= 2:
+        if has_some[candidates != pattern.trial].sum() >= 2:
             candidates = np.flatnonzero(has_some)
-    candidates = candidates[candidates != pattern.index]
+    candidates = candidates[candidates != pattern.trial]
     return candidates[choose_exemplars(distances[candidates], consensus)]
 
 
@@ -364,7 +364,7 @@ def _unexplained(clock, training, pattern, vote):
 
     NaN if there are none but the pattern, or no vote.
     """
-    whole = known_whole(training.trials, pattern.index)
+    whole = known_whole(training.trials, pattern.trial)
     if not len(whole) or vote.warper.smoothing is None:
         return np.nan
     evenly = np.linspace(0, len(whole) - 1, min(len(whole), MOST_LEARNT))

@@ -226,8 +226,8 @@ class PartSynchronizer(AnchoredSynchronizer):
             parts = choose_parts(self.parts, training.trials, names_of_input(body))
             learnt = learn_parts(body, training, parts, self.coupling, progress)
         shared = {name: value for name, value in vars(body).items() if name in _SHARED}
-        vars(self).pop("feature_names_in_", None)
-        vars(self).update(
+        self.__dict__.pop("feature_names_in_", None)
+        self.__dict__.update(
             shared,
             synchronizer_=body,
             parts_=parts,

@@ -203,15 +203,15 @@ class Pattern(NamedTuple):
 
     Attributes
     ----------
-    index : int or None
-        In the training set; None if it was given as an array.
+    trial : int or None
+        Its index in the training set; None if it was given as an array.
     array : ndarray, shape (n_frames, n_features)
         As recorded.
     distances : ndarray, shape (n_trials,)
         Global distances of the training set; NaN if there are none.
     """
 
-    index: int | None
+    trial: int | None
     array: np.ndarray
     distances: np.ndarray
 
@@ -232,7 +232,7 @@ def pattern_of(training, pattern, median):
     if isinstance(pattern, np.ndarray):
         return Pattern(None, pattern, unknown)
     if median is not None:
-        return Pattern(median.index, trials[median.index], median.distances)
+        return Pattern(median.trial, trials[median.trial], median.distances)
     index = list(trials.numbers).index(pattern)
     return Pattern(index, trials[index], unknown)
 

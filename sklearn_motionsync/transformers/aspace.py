@@ -240,8 +240,8 @@ class ASpace(
         arrays = [
             (a @ self.components_ + self.mean_).astype(a.dtype, copy=False) for a in performances
         ]
-        names = getattr(self, "feature_names_in_", range(self.n_features_in_))
-        return restore(self, performances, arrays, columns=names)
+        columns = getattr(self, "feature_names_in_", range(self.n_features_in_))
+        return restore(self, performances, arrays, columns=columns)
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the coordinates: ``aspace0``, ``aspace1``, ...

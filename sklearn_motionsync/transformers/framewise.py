@@ -32,7 +32,7 @@ __all__ = ["FrameWise"]
 
 def _goes_back(self):
     """Whether the transformer inverts; fit tries, as some do so with some settings only."""
-    return vars(self).get("_inverts", hasattr(self.transformer, "inverse_transform"))
+    return self.__dict__.get("_inverts", hasattr(self.transformer, "inverse_transform"))
 
 
 class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, BaseEstimator):

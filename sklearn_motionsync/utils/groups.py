@@ -27,7 +27,9 @@ _NOT_LISTS = str, bytes, Mapping, Set
 _DATES = "Mm"
 
 
-def encode_groups(groups, n_performances, *, name="groups", at_least=1, sort=False):
+def encode_groups(
+    groups, n_performances, *, name="groups", at_least=1, sort=False
+) -> tuple[np.ndarray, list]:
     """Encode the group of each performance as an integer from 0.
 
     Parameters

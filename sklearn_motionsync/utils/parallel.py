@@ -13,6 +13,7 @@ import threading
 import time
 import uuid
 from collections import deque
+from typing import Any
 
 from joblib import Parallel, delayed, effective_n_jobs
 from joblib.parallel import get_active_backend
@@ -23,11 +24,8 @@ __all__ = ["LongWorkMixin", "Progress", "SharedArgument", "on_cluster", "one_bla
 
 try:
     from sklearn.callback import CallbackSupportMixin
-except ImportError:  # scikit-learn before 1.9
-
-    class CallbackSupportMixin:
-        """No callbacks."""
-
+except ImportError:  # scikit-learn before 1.9 has no callbacks
+    CallbackSupportMixin = object
 
 # Seconds between two lines of a verbose estimator.
 _INTERVAL = 1.0
@@ -171,7 +169,8 @@ def on_cluster():
 # A thread that holds the lock may collect garbage that leaves a context, and takes it again.
 _blas_lock = threading.RLock()
 # One object for every context that has not ended, and the limit that the first of them set.
-_blas_contexts, _blas_limits = set(), []
+_blas_contexts: set[object] = set()
+_blas_limits: list[Any] = []
 
 
 @contextlib.contextmanager
@@ -450,7 +449,7 @@ class ScatteredReference:
 
 
 # The last value that a worker fetched itself, by its key.
-_fetched = {}
+_fetched: dict[str, Any] = {}
 
 
 def _identity(value):

@@ -62,9 +62,9 @@ def test_ties_go_to_the_first(n):
     references = draw_references(n, np.random.RandomState(0))
     sums = np.full(n, len(references), dtype=float)
     sums[references] -= 1
-    assert median_of_sums(sums + noise, references, 1e-9).index == 0
+    assert median_of_sums(sums + noise, references, 1e-9).trial == 0
     sums[n // 2] -= 0.01
-    assert median_of_sums(sums + noise, references, 1e-9).index == n // 2
+    assert median_of_sums(sums + noise, references, 1e-9).trial == n // 2
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

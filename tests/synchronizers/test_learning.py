@@ -70,7 +70,7 @@ def test_six_steps_by_hand_arrive_at_the_same_times(params):
         distances, times = warp_in_portions(
             final.warper, X, n_jobs=None, begin=lambda fits: progress, name="warping"
         )
-    assert pattern.index == sync.pattern_index_
+    assert pattern.trial == sync.pattern_index_
     np.testing.assert_array_equal(pattern.distances, sync.global_distances_)
     np.testing.assert_array_equal(vote.exemplars, sync.exemplars_)
     np.testing.assert_array_equal(final.unexplained, sync.unexplained_variance_)
