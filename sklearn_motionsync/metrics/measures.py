@@ -275,7 +275,7 @@ def _summary(errors, quantile):
 # -- checks of arguments ------------------------------------------------------------------
 
 
-def _as_warps(times, what="times"):
+def _as_warps(times, what="times") -> np.ndarray:
     """Warps (n_sequences >= 1, P >= 2), from 0 to P - 1."""
     times = as_numbers(times, what, dtype=np.float64)
     if times.ndim != 2 or times.shape[0] < 1 or times.shape[1] < 2:
@@ -294,14 +294,14 @@ def _as_warps(times, what="times"):
     return np.clip(times, 0, last)
 
 
-def _as_warps_of_one_shape(times, reference, what):
+def _as_warps_of_one_shape(times, reference, what) -> tuple[np.ndarray, np.ndarray]:
     times, reference = _as_warps(times), _as_warps(reference, what)
     if times.shape != reference.shape:
         raise ValueError(f"times {times.shape} and {what} {reference.shape} differ in shape.")
     return times, reference
 
 
-def _as_moments(moments, n_sequences):
+def _as_moments(moments, n_sequences) -> list[np.ndarray]:
     """Shares of the action, one array (n_frames_i >= 2,) a warp, from 0 to 1, not decreasing."""
     rows = _as_rows(moments, "moments")
     if len(rows) != n_sequences:
