@@ -113,6 +113,7 @@ def test_the_package_is_marked_as_typed():
 # -- mypy -------------------------------------------------------------------------------------
 
 PREAMBLE = """\
+from functools import partial
 import numpy as np
 import pandas as pd
 from sklearn.pipeline import make_pipeline
@@ -161,6 +162,7 @@ PartSynchronizer({"arm": [0], "leg": [1]}, synchronizer=DenseSynchronizer(n_fram
 SpreadScorer("sobolev")(sync, X) + least_squares(np.stack(X), np.stack(X))
 timing_error(sync.match(X).times, sync.match(X).times.tolist(), quantile=0.9)
 make_gait(2, takes=True).data[0].shape
+partial(read_motion, "trial.amc", asf="trial.asf")
 to_sequences(pd.DataFrame({"trial": [1, 1, 2, 2], "x": [0.0, 1, 0, 1]}), by="trial")
 """
 
@@ -217,14 +219,13 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("mypy")
 
 
-def run_mypy(folder, *lines):
-    """The messages of mypy about lines after the preamble, by their numbers from 0."""
-    script = folder / "script.py"
-    script.write_text(PREAMBLE + "\n".join(lines) + "\n", encoding="utf-8")
-    command = [sys.executable, "-m", "mypy", "--config-file=", "--follow-imports=silent"]
-    command += ["--ignore-missing-imports", "--no-error-summary", "--cache-dir", str(folder)]
+def run_mypy(folder, *arguments):
+    """What mypy says of the code beside these tests, line by line."""
+    # One set of options, so that the package is read once.
+    command = [sys.executable, "-m", "mypy", "--follow-imports=silent", "--ignore-missing-imports"]
+    command += ["--no-error-summary", "--cache-dir", str(folder)]
     done = subprocess.run(
-        [*command, script.name],
+        [*command, *arguments],
         cwd=folder,
         env={**os.environ, "MYPYPATH": str(ROOT)},
         capture_output=True,
@@ -232,8 +233,15 @@ def run_mypy(folder, *lines):
         check=False,
     )
     assert done.stderr == ""
+    return done.stdout.splitlines()
+
+
+def messages_about(folder, *lines):
+    """The messages of mypy about lines after the preamble, by their numbers from 0."""
+    script = folder / "script.py"
+    script.write_text(PREAMBLE + "\n".join(lines) + "\n", encoding="utf-8")
     first, found = PREAMBLE.count("\n") + 1, {}
-    for message in done.stdout.splitlines():
+    for message in run_mypy(folder, "--config-file=", script.name):
         file, number, kind, text = re.fullmatch(r"(.+?):(\d+): (\w+): (.*)", message).groups()
         assert file == script.name or kind == "note", message
         if file == script.name:
@@ -247,9 +255,13 @@ def context():
     return names
 
 
+def test_mypy_has_nothing_to_say_about_the_package(folder):
+    assert run_mypy(folder, "--config-file", str(ROOT / "pyproject.toml")) == []
+
+
 def test_mypy_reports_every_wrong_line_and_no_right_one(folder):
     right, wrong = RIGHT.splitlines(), WRONG.splitlines()
-    found = run_mypy(folder, *right, *wrong)
+    found = messages_about(folder, *right, *wrong)
     assert {right[i]: found[i] for i in sorted(found) if i < len(right)} == {}
     missed = [line for i, line in enumerate(wrong, len(right)) if i not in found]
     assert missed == []
@@ -267,7 +279,7 @@ def test_mypy_knows_what_methods_return(folder):
         "Skeleton.paper()": "Skeleton",
         "display.TrellisDisplay.from_estimator(sync, X)": "TrellisDisplay",
     }
-    found = run_mypy(folder, *(f"reveal_type({each})" for each in kinds))
+    found = messages_about(folder, *(f"reveal_type({each})" for each in kinds))
     assert sorted(found) == list(range(len(kinds)))
     for i, (line, kind) in enumerate(kinds.items()):
         assert re.search(rf'Revealed type is "[\w.]*\b({kind})\b', found[i][0]), line
