@@ -40,7 +40,6 @@ from sklearn_motionsync import (
     CycleSegmenter,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     MotionTracker,
     OnlineSynchronizer,
@@ -345,7 +344,7 @@ def part_sync(data):
 def keyframe_ft(data):
     X = data.hops_on_clock
     keyframes = np.full((len(X), 1), 50.0)
-    return Work(lambda: KeyframeSynchronizer(n_frames=P).fit_transform(X, keyframes=keyframes))
+    return Work(lambda: LinearSynchronizer(n_frames=P).fit_transform(X, keyframes=keyframes))
 
 
 def model_only_score(data):

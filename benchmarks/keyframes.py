@@ -14,7 +14,7 @@ import sys
 import numpy as np
 from harness import EVENTS, FLOOR, FOLDS, P, read_people
 from sklearn.model_selection import GroupKFold
-from sklearn_motionsync import ASpace, DenseSynchronizer, KeyframeSynchronizer
+from sklearn_motionsync import ASpace, DenseSynchronizer, LinearSynchronizer
 
 FRAMES = np.arange(P)
 FEW, DRAWS = 0.2, 4
@@ -44,7 +44,7 @@ def anchored(std):
 
 
 def piecewise_linear(X, at, template, others, of_others):
-    sync = KeyframeSynchronizer(P, pattern=template)
+    sync = LinearSynchronizer(P, pattern=template)
     sync.fit(X, keyframes=own_frames(at, X))
     return sync.match(others, keyframes=own_frames(of_others, others)).times
 

@@ -26,7 +26,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
@@ -220,19 +219,19 @@ dimensions, axes = plt.subplots(
 SynchronizationDisplay.from_estimator(
     pipe, bunch.data, features=range(n_dims), warps=False, ax=axes[:2].T
 )
-by_hand = KeyframeSynchronizer(n_frames=100).fit_transform(points, keyframes=bunch.get("keyframes"))
+keyframes = bunch.get("keyframes")
+straight = LinearSynchronizer(n_frames=100).fit_transform(points, keyframes=keyframes)
 for column, axis in enumerate(axes[2]):
-    axis.plot(by_hand[:, :, column].T, color="#009E73", alpha=0.5, linewidth=0.9)
+    axis.plot(straight[:, :, column].T, color="#009E73", alpha=0.5, linewidth=0.9)
     axis.set_xlabel("frame of the template")
 shown = ActionModelDisplay.from_estimator(
     pipe, bunch.data, features=range(n_dims), band="points", ax=axes[3]
 )
 shown.axes_[0].get_legend().remove()
-given = "given" if "keyframes" in bunch else "found"
 titles = (
     f"as recorded: {len(points)} trials",
     "aligned by dense matching; black: the template",
-    f"aligned by 5 {given} key-frames in each",
+    "stretched evenly" + ("" if keyframes is None else " between 5 key-frames in each"),
     "the model: mean and three standard deviations",
 )
 for place, (row, title) in enumerate(zip(axes, titles, strict=True)):

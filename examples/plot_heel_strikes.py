@@ -15,7 +15,6 @@ from sklearn_motionsync import (
     ActionModel,
     DenseSynchronizer,
     FrameWise,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     find_departures,
 )
@@ -85,7 +84,7 @@ print("toe-off at frame", toe_off.iloc[:6, 0].round(1).tolist(), "...")
 scaler = FrameWise(StandardScaler())
 scaled = scaler.fit_transform(cycles)
 dense = DenseSynchronizer(101).fit(scaled)
-toe_off_only = KeyframeSynchronizer(101).fit(scaled, keyframes=toe_off)
+toe_off_only = LinearSynchronizer(101).fit(scaled, keyframes=toe_off)
 matches = {
     "linear": LinearSynchronizer(101).fit(scaled).match(scaled),
     "toe-off as key-frame": toe_off_only.match(scaled, keyframes=toe_off),

@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
 )
 from sklearn_motionsync.datasets import make_bending
@@ -42,7 +41,7 @@ print(f"the template is trial {base}, the other one trial {other}")
 # a time for each frame (Eqs. 12 to 17).
 
 linear = LinearSynchronizer(n_frames=100, pattern=base).fit(points)
-manual = KeyframeSynchronizer(n_frames=100, pattern=base).fit(points, keyframes=bunch.keyframes)
+manual = LinearSynchronizer(n_frames=100, pattern=base).fit(points, keyframes=bunch.keyframes)
 times = {
     "linear": linear.match(points).times,
     "five key-frames": manual.match(points, keyframes=bunch.keyframes).times,

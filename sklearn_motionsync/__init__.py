@@ -41,7 +41,6 @@ from .synchronizers.base import Synchronizer
 from .synchronizers.blending import blend_performances
 from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.evidence import SynchronizationWarning
-from .synchronizers.keyframes import KeyframeSynchronizer
 from .synchronizers.lags import Lags
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
@@ -62,7 +61,6 @@ __all__ = [
     "GroupComparison",
     "JointNoise",
     "JointPositions",
-    "KeyframeSynchronizer",
     "Lags",
     "LinearSynchronizer",
     "LivePhase",

@@ -21,7 +21,6 @@ from sklearn_motionsync import (
     DirectionCosines,
     FrameWise,
     JointPositions,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     MotionTracker,
     OnlineSynchronizer,
@@ -63,7 +62,6 @@ INSTANCES = {
     "ASpace": [ASpace()],
     "FrameWise": [FrameWise(PCA(2))],
     "LinearSynchronizer": [LinearSynchronizer()],
-    "KeyframeSynchronizer": [KeyframeSynchronizer()],
     "DenseSynchronizer": [DenseSynchronizer()],
     "PartSynchronizer": [PartSynchronizer({"first": [0]}, synchronizer=WHOLE)],
     "Synchronizer": [ShiftSynchronizer()],
@@ -88,7 +86,6 @@ def all_of(*names):
 
 SYNCHRONIZERS = all_of(
     "LinearSynchronizer",
-    "KeyframeSynchronizer",
     "DenseSynchronizer",
     "PartSynchronizer",
     "Synchronizer",

@@ -16,7 +16,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
 )
@@ -183,7 +182,7 @@ def test_absent_step_of_a_nested_pipeline_is_refused(few):
 
 def make_marked(bunch, *, nested):
     """A pipeline with key-frames, fitted."""
-    sync = KeyframeSynchronizer(40)
+    sync = LinearSynchronizer(40)
     with config_context(enable_metadata_routing=True):
         sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
         steps = DirectionCosines(bunch.skeleton), ASpace(4), sync, ActionModel()
@@ -209,7 +208,7 @@ OF_PIPELINES = {
 def test_displays_and_scorers_take_key_frames(nested, routing, few, no_figures):
     pipe, K = make_marked(few, nested=nested), list(few.keyframes)
     points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
-    sync = KeyframeSynchronizer(40).fit(points, keyframes=K)
+    sync = LinearSynchronizer(40).fit(points, keyframes=K)
     expected = sync.match(points, keyframes=K)
     with config_context(enable_metadata_routing=routing):
         match = Match.from_estimator(pipe, few.data, keyframes=K)
@@ -259,8 +258,8 @@ def test_key_frames_reach_a_step_before_the_synchronizer(few, no_figures):
     """Dense matching of what coincides in its key-frames already."""
     K = few.keyframes
     points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
-    steps = KeyframeSynchronizer(40), DenseSynchronizer(30)
-    pipe = make_pipeline(*steps).fit(points, keyframesynchronizer__keyframes=K)
+    steps = LinearSynchronizer(40), DenseSynchronizer(30)
+    pipe = make_pipeline(*steps).fit(points, linearsynchronizer__keyframes=K)
     marked = steps[0].transform(points, keyframes=K)
     display = TrellisDisplay.from_estimator(pipe, points, performance=2, keyframes=K)
     expected = TrellisDisplay.from_estimator(steps[1], marked, performance=2)

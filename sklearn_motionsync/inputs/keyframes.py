@@ -43,7 +43,7 @@ class Keyframes:
             rates = as_frame_rates(frame_rate, n_sequences)
             self._rates = np.broadcast_to(rates, (n_sequences, 1))[:, 0]
 
-    def shares(self, performances, count=None, *, complete=False):
+    def shares(self, performances, count=None):
         """Key-frames (n_sequences, n_keyframes) as shares of the performances, NaN for not known.
 
         Parameters
@@ -52,8 +52,6 @@ class Keyframes:
             All or, by their ``numbers``, some of the set.
         count : int, default=None
             Key-frames of each; by default as many as the first has.
-        complete : bool, default=False
-            Whether all have to be known.
         """
         numbers = range(len(self._rows))
         if len(performances) < len(self._rows):
@@ -65,14 +63,12 @@ class Keyframes:
         out = np.full((len(performances), count), np.nan)
         for row, i, x in zip(out, numbers, performances, strict=True):
             if self._rows[i] is not None:
-                row[:] = self._checked(i, len(x), count, complete)
-            elif complete:
-                raise ValueError(f"Performance {i}: key-frames must be given, got None.")
+                row[:] = self._checked(i, len(x), count)
         return out
 
-    def known(self, performances, *, complete=False):
+    def known(self, performances):
         """Key-frames of a training set as from `shares`, each of them known in some performance."""
-        out = self.shares(performances, complete=complete)
+        out = self.shares(performances)
         missing = np.flatnonzero(np.isnan(out).all(axis=0))
         if len(missing) or not out.shape[1]:
             which = f"key-frame {missing[0]}" if len(missing) else "a key-frame"
@@ -82,7 +78,7 @@ class Keyframes:
             )
         return out
 
-    def _checked(self, i, n_frames, count, complete):
+    def _checked(self, i, n_frames, count):
         """The key-frames of one performance, as shares."""
         row = self._rows[i]
         frames = as_numbers(row, f"Performance {i}: {self._name}", dtype=np.float64)
@@ -92,14 +88,13 @@ class Keyframes:
         else:
             refuse_seconds(known_frames, n_frames, f"Performance {i}")
         path = np.concatenate([[0], known_frames, [n_frames - 1]])
-        is_whole = count > 0 and (len(known_frames) == count or not complete)
-        if frames.shape != (count,) or not is_whole or not (np.diff(path) > 0).all():
+        if frames.shape != (count,) or count == 0 or not (np.diff(path) > 0).all():
             unit = "" if self._rates is None else f" times {self._rates[i]:g} frames per second"
-            unknown = "" if complete else ", NaN where one is not known"
             raise ValueError(
                 f"Performance {i}: key-frames must be "
                 f"{counted(count, 'increasing frame') if count else 'some increasing frames'} "
-                f"between 0 and {n_frames - 1}, both excluded{unknown}, got {row}{unit}."
+                f"between 0 and {n_frames - 1}, both excluded, NaN where one is not known, "
+                f"got {row}{unit}."
             )
         return frames / (n_frames - 1)
 

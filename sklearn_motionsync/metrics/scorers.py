@@ -63,13 +63,13 @@ class _SynchronizerScorer(BaseEstimator):
         --------
         >>> from sklearn import config_context
         >>> from sklearn.model_selection import cross_val_score
-        >>> from sklearn_motionsync import KeyframeSynchronizer
+        >>> from sklearn_motionsync import LinearSynchronizer
         >>> from sklearn_motionsync.datasets import make_bending
         >>> from sklearn_motionsync.metrics import SpreadScorer
         >>> bunch = make_bending(8, random_state=0)
         >>> with config_context(enable_metadata_routing=True):
         ...     scores = cross_val_score(
-        ...         KeyframeSynchronizer(40).set_fit_request(keyframes=True),
+        ...         LinearSynchronizer(40).set_fit_request(keyframes=True),
         ...         bunch.data,
         ...         cv=2,
         ...         scoring=SpreadScorer().set_score_request(keyframes=True),

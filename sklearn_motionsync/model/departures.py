@@ -466,7 +466,8 @@ def _match_of(estimator, X, params, caller):
 def _is_linear(estimator):
     """Whether the synchronizer leaves time as it is."""
     synchronizer = find_synchronizer(estimator)[1]
-    return isinstance(getattr(synchronizer, "synchronizer_", synchronizer), LinearSynchronizer)
+    synchronizer = getattr(synchronizer, "synchronizer_", synchronizer)
+    return isinstance(synchronizer, LinearSynchronizer) and synchronizer.keyframes_ is None
 
 
 class Runs(NamedTuple):

@@ -1,5 +1,5 @@
 """Synchronizers: estimators that put performances on the clock of a pattern (Eqs. 6-19).
 
-``base`` holds what all of them share and ``match`` what they answer; ``linear``, ``dense`` and
-``keyframes`` only say how they match; ``timing`` puts the warps of any of them beside the curves.
+``base`` holds what all of them share and ``match`` what they answer; ``linear`` and ``dense`` only
+say how they match; ``timing`` puts the warps of any of them beside the curves.
 """

@@ -19,6 +19,7 @@ from ..inputs.types import (
 )
 from ..utils.parameters import validated
 from .base import Synchronizer
+from .gaps import with_confidence
 from .match import Match
 from .training import TrainingSet
 
@@ -34,9 +35,6 @@ class AnchoredSynchronizer(Synchronizer):
     """
 
     keyframes_: np.ndarray | None
-
-    # Whether every key-frame of every performance has to be known.
-    _needs_all = False
 
     def fit(
         self,
@@ -56,8 +54,7 @@ class AnchoredSynchronizer(Synchronizer):
             Present for API consistency.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
             One row a performance, in its own frames, counted from its first row (fractions
-            allowed), increasing. NaN, or None for a whole row, where one is not known;
-            `KeyframeSynchronizer` needs all of them.
+            allowed), increasing. NaN, or None for a whole row, where one is not known.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames per second of X. With it key-frames are seconds.
         confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
@@ -85,13 +82,11 @@ class AnchoredSynchronizer(Synchronizer):
     def _fit(self, X, keyframes, frame_rate, confidence):
         """Fit, and return the `TrainingSet`."""
         with self._progress(fits=True) as progress:
-            if confidence is not None:
-                self._refuse_confidence()
             training = self._read_training_set(X, confidence=confidence)
             if keyframes is not None:
                 refuse_moved_events(X)
                 rows = Keyframes(keyframes, training.population, frame_rate)
-                shares = rows.known(training.trials, complete=self._needs_all)
+                shares = rows.known(training.trials)
                 training = TrainingSet(
                     training.trials, training.filler, training.population, shares
                 )
@@ -210,18 +205,12 @@ class AnchoredSynchronizer(Synchronizer):
         elif frame_rate is not None:
             as_frame_rates(frame_rate)
         if confidence is not None:
-            self._refuse_confidence()
             params["confidence"] = confidence
         return params
 
-    def _refuse_confidence(self):
-        """Refuse confidence where gaps are refused."""
-        if self._finite is True:
-            name = type(self).__name__
-            raise ValueError(
-                f"{name} takes no gaps, and so no confidence=. DenseSynchronizer takes both, "
-                "and key-frames."
-            )
+    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
+        return self._match(performances, keyframes, frame_rate).warp(performances)
 
     def _shares(self, performances, keyframes, frame_rate):
         """Key-frames of performances as shares of them, by those of the fit; None if none are."""
@@ -233,4 +222,4 @@ class AnchoredSynchronizer(Synchronizer):
                 "it does not know where they are in the pattern. Fit it with keyframes=[...], too."
             )
         rows = Keyframes(keyframes, len(performances), frame_rate)
-        return rows.shares(performances, len(self.keyframes_), complete=self._needs_all)
+        return rows.shares(performances, len(self.keyframes_))

@@ -1,23 +1,28 @@
-"""LinearSynchronizer: linear normalisation, the baseline (Eq. 7)."""
+"""LinearSynchronizer: linear normalisation (Eq. 7), and between key-frames (Figs. 1c and 3c)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..inputs.types import PerformancesLike
+from ..inputs.validation import names_of_input
+from ..matching.anchors import first_meeting, pin
 from ..matching.sizes import BATCH
-from ..matching.warps import normalise
-from .base import Synchronizer
+from ..matching.warps import even_slices, normalise, sample
+from ..utils.pipelines import MissingMetadata
+from .anchored import AnchoredSynchronizer
+from .gaps import with_confidence
 from .match import Match
+from .training import check_pattern
 
 __all__ = ["LinearSynchronizer"]
 
 
-class LinearSynchronizer(Synchronizer):
+class LinearSynchronizer(AnchoredSynchronizer):
     """Linear normalisation (Eq. 7): the same number of frames, no matching.
 
-    The baseline of all other synchronizers: each performance is stretched evenly to
-    ``n_frames``; the pattern is only the reference of the distances.
+    The baseline of all other synchronizers: each performance is stretched evenly to ``n_frames``.
+    If key-frames are given, it is stretched evenly between them, so that they coincide with those
+    of the pattern, as in Figs. 1c and 3c of the paper. A key-frame that is not known is left out.
 
     Parameters
     ----------
@@ -25,8 +30,8 @@ class LinearSynchronizer(Synchronizer):
         Frames of the common clock; by default the median length of the performances, or
         the length of a pattern given as an array.
     pattern : "median", int or array (n_frames, n_features), default="median"
-        The reference of ``match``: the performance with the smallest sum of distances
-        (Eq. 19, without matching), one chosen by its index, or another one.
+        The reference of ``match``: the performance with the smallest sum of distances (Eq. 19,
+        after warping by the key-frames if there are any), one chosen by its index, or another one.
 
     Attributes
     ----------
@@ -38,6 +43,9 @@ class LinearSynchronizer(Synchronizer):
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
         ``C_n`` of Eq. 19 for every performance; NaN if the pattern was given.
+    keyframes_ : ndarray, shape (n_keyframes,), or None
+        Key-frames of the pattern, in frames of the clock: its own, and for those it lacks the
+        median of where those of the others meet it. None if none were given.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     lengths_ : ndarray of int, shape (n_sequences,)
@@ -51,39 +59,94 @@ class LinearSynchronizer(Synchronizer):
 
     See Also
     --------
-    DenseSynchronizer : Follows the changes of pace within a performance.
+    DenseSynchronizer : Follows the changes of pace within a performance, and between key-frames.
+    io.keyframes_from_events : Makes key-frames of a table of events.
+
+    Notes
+    -----
+    After a fit with key-frames nothing else aligns performances, so ``match`` and ``transform``
+    need them, too; None in the place of a row says that none of a performance are known. They are
+    metadata: in a Pipeline enable scikit-learn's metadata routing and request them with
+    ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``, for scorers
+    with ``set_score_request(keyframes=True)``. Scorers that are called directly, displays and
+    ``Match.from_estimator`` take ``keyframes=...``.
 
     Examples
     --------
     >>> import numpy as np
     >>> from sklearn_motionsync import LinearSynchronizer
     >>> X = [np.arange(5.0)[:, None], np.arange(9.0)[:, None] / 2]
-    >>> LinearSynchronizer(n_frames=5).fit_transform(X)[1].ravel().tolist()
+    >>> sync = LinearSynchronizer(n_frames=5, pattern=0)
+    >>> sync.fit_transform(X)[1].ravel().tolist()
     [0.0, 1.0, 2.0, 3.0, 4.0]
+    >>> sync.fit_transform(X, keyframes=[[2], [6]])[1].ravel().tolist()
+    [0.0, 1.5, 3.0, 3.5, 4.0]
     """
 
     _finite = "allow-nan"
 
-    def match(self, X: PerformancesLike) -> Match:
-        """Match performances to the pattern without any warp.
+    def _given(self, X, keyframes, frame_rate, confidence=None):
+        if keyframes is None and getattr(self, "keyframes_", None) is not None:
+            raise MissingMetadata(
+                "The synchronizer was fitted with key-frames: give those of these performances too",
+                "keyframes",
+            )
+        return super()._given(X, keyframes, frame_rate, confidence)
 
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-
-        Returns
-        -------
-        Match
-            Offsets of 0, and ``distances``, shape (n_sequences,): squared ones to the pattern.
-        """
-        return self._match_in_parts(X)
-
-    def _match(self, performances):
+    def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
+        shares = self._shares(performances, keyframes, frame_rate)
+        times = even_times(len(performances), self.n_frames_)
+        if shares is not None:
+            times = pin(times, self.keyframes_, shares * (self.n_frames_ - 1), reach=np.inf)
         arrays, distances = list(self._without_gaps(performances)), np.empty(len(performances))
-        for start in range(0, len(arrays), BATCH):
-            rows = slice(start, start + BATCH)
-            differences = normalise(arrays[rows], self.n_frames_) - self.pattern_
-            distances[rows] = np.square(differences).sum(axis=(1, 2), dtype=np.float64)
-        clock = np.arange(self.n_frames_, dtype=np.float64)
-        return Match(np.tile(clock, (len(arrays), 1)), distances)
+        for rows in even_slices(len(performances), BATCH):
+            if shares is None:
+                warped = normalise(arrays[rows], self.n_frames_)
+            else:
+                warped = sample(arrays[rows], times[rows], self.n_frames_)
+            differences = np.square(warped - self.pattern_)
+            distances[rows] = differences.sum(axis=(1, 2), dtype=np.float64)
+        return Match(times, distances)
+
+    def _learn(self, training, progress):
+        pattern = check_pattern(self.pattern, training.trials, names_of_input(self))
+        clock = self._put_on_clock(training._replace(keyframes=None), pattern)
+        if training.keyframes is None:
+            return self._learnt(training, clock, pattern, clock.poses) | {"keyframes_": None}
+        keyframes = training.keyframes * (clock.n_frames - 1)
+        # On the mean key-frames all performances are comparable, as on one clock.
+        mean = np.maximum.accumulate(np.nanmean(keyframes, axis=0))
+        times = pin(even_times(*clock.positions.shape[:2]), mean, keyframes, reach=np.inf)
+        comparable = clock.unit(sample(training.trials, times, clock.n_frames))
+        learnt = self._learnt(training, clock, pattern, comparable)
+        of_pattern = keyframes_of_pattern(learnt["pattern_index_"], keyframes, clock.n_frames)
+        return learnt | {"keyframes_": of_pattern}
+
+
+def even_times(n_trials, n_frames):
+    """The warps of linear normalisation: (n_trials, P)."""
+    return np.tile(np.arange(n_frames, dtype=np.float64), (n_trials, 1))
+
+
+def keyframes_of_pattern(index, keyframes, n_frames):
+    """Key-frames of the pattern: its own, or the median of where those of the others meet it.
+
+    Parameters
+    ----------
+    index : int or None
+        Of the pattern among the trials.
+    keyframes : ndarray, shape (n_trials, n_keyframes)
+        In frames of the clock; NaN where one is not known.
+    n_frames : int
+        ``P``.
+
+    Returns
+    -------
+    ndarray, shape (n_keyframes,)
+    """
+    own = np.full(keyframes.shape[1], np.nan) if index is None else keyframes[index]
+    common = np.where(np.isnan(own), np.nan, keyframes)
+    times = pin(even_times(len(keyframes), n_frames), own, common, reach=np.inf)
+    met = np.nanmedian(first_meeting(times, keyframes), axis=0)
+    return np.maximum.accumulate(np.where(np.isnan(own), met, own))

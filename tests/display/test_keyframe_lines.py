@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionModel, DenseSynchronizer, KeyframeSynchronizer
+from sklearn_motionsync import ActionModel, DenseSynchronizer
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay, TrellisDisplay
 
@@ -74,9 +74,6 @@ def test_key_frames_that_trials_lack_are_lines_without_names(sync):
     assert none.keyframes_ == none.own_keyframes_ == []
     plain = DenseSynchronizer(61).fit(X)
     assert SynchronizationDisplay.from_estimator(plain, X, features=0).keyframes_ == []
-    found = KeyframeSynchronizer(61).fit(X)
-    display = SynchronizationDisplay.from_estimator(found, X, features=0)
-    np.testing.assert_allclose(places(display.keyframes_[0]), found.keyframes_)
     plt.close("all")
 
 

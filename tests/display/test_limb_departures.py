@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
     Skeleton,
@@ -194,7 +193,7 @@ def test_a_reference_is_what_is_expected(bunch, pipe):
 def test_tables_and_key_frames_are_accepted(bunch):
     labels = list("abcdefgh")
     frames = pd.concat(dict(zip(labels, map(pd.DataFrame, bunch.data), strict=True)))
-    steps = DirectionCosines(bunch.skeleton), ASpace(0.99), KeyframeSynchronizer(40), ActionModel()
+    steps = DirectionCosines(bunch.skeleton), ASpace(0.99), LinearSynchronizer(40), ActionModel()
     drawn = []
     for X, output in ((bunch.data, "default"), (frames, "pandas")):
         with config_context(enable_metadata_routing=True):

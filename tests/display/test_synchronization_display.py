@@ -12,7 +12,6 @@ from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
     ActionModel,
     DenseSynchronizer,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
     PartSynchronizer,
@@ -268,7 +267,7 @@ def test_sure_trials_are_drawn_as_before(bunch, pipe):
 def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
     X = [*bunch.data[:8], twice(bunch.data[8])]
     linear, marks = LinearSynchronizer(30).fit(X), {"keyframes": bunch.keyframes}
-    by_marks = KeyframeSynchronizer(30).fit(bunch.data, **marks)
+    by_marks = LinearSynchronizer(30).fit(bunch.data, **marks)
     for display in (
         SynchronizationDisplay.from_estimator(pipe, X, coverage=None),
         SynchronizationDisplay.from_estimator(linear, X),

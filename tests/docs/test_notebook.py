@@ -16,7 +16,6 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     JointPositions,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     PartSynchronizer,
     Skeleton,
@@ -30,7 +29,6 @@ ESTIMATORS = [
     DenseSynchronizer(),
     DirectionCosines(Skeleton.paper()),
     JointPositions(Skeleton.paper()),
-    KeyframeSynchronizer(),
     LinearSynchronizer(),
     PartSynchronizer(),
 ]

@@ -5,6 +5,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 SCRIPT = Path(__file__).parents[2] / "examples" / "reproduce_paper.py"
@@ -40,6 +41,25 @@ def test_the_paper_and_key_frames_are_similar_for_few_moments_only(report):
     assert all(a > 0.9 * b for a, b in zip(of["paper"][lowest], of["linear"][lowest], strict=True))
     assert all(a > b for a, b in zip(of["paper"][lowest], of["key-frames"][lowest], strict=True))
     assert all(a < 0.7 * b for a, b in zip(of["paper"][2:], of["linear"][2:], strict=True))
+
+
+def test_key_frames_of_largest_curvature_are_other_moments(report):
+    curvature, keyframes = (errors_of(report[0], name) for name in ("curvature", "key-frames"))
+    assert all(a > 1.5 * b for a, b in zip(curvature, keyframes, strict=True))
+
+
+def test_curvature_is_largest_in_corners_and_finds_them_again():
+    """A path along three edges of a box has two corners; one that is late has them later."""
+    script = runpy.run_path(str(SCRIPT))
+    paths = []
+    for first, second in ((30, 60), (40, 65)):
+        along = np.interp(np.arange(91), [0, first, second, 90], [0, 1, 2, 3])[:, np.newaxis]
+        paths.append(np.clip(along - np.arange(3), 0, 1))
+    corners = script["most_curved"](paths[0], 2)
+    np.testing.assert_allclose(corners, [30, 60], atol=1)
+    np.testing.assert_allclose(
+        script["same_moments"](paths[0], corners, paths[1]), [40, 65], atol=1
+    )
 
 
 def test_the_defaults_are_as_near_as_key_frames(report):

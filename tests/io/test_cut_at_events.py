@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import KeyframeSynchronizer, to_frame
+from sklearn_motionsync import LinearSynchronizer, to_frame
 from sklearn_motionsync.io import cut_at_events, read_motion
 
 from motion_files import c3d, everything, put, texts
@@ -121,7 +121,7 @@ def test_events_within_performances_are_keyframes():
     parts = cut_at_events(recording(*WALK), STRIKE)
     with_off = [x for x in parts if any(e["label"] == OFF for e in x.attrs["events"])]
     keyframes = [[e["frame"] for e in x.attrs["events"]] for x in with_off]
-    sync = KeyframeSynchronizer(n_frames=30).fit(with_off, keyframes=keyframes)
+    sync = LinearSynchronizer(n_frames=30).fit(with_off, keyframes=keyframes)
     assert sync.transform(with_off, keyframes=keyframes).shape == (2, 30, 1)
 
 

@@ -19,7 +19,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
 )
 from sklearn_motionsync.datasets import make_bending
@@ -61,7 +60,7 @@ def requesting(scorer):
 
 
 def requesting_sync():
-    sync = KeyframeSynchronizer(40)
+    sync = LinearSynchronizer(40)
     return sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
 
 
@@ -158,36 +157,36 @@ def test_holdout_score_is_reproducible_and_leaves_the_estimator_as_it_was(points
 
 def test_spread_score_with_key_frames_is_the_negative_ratio(bunch, points):
     K = bunch.keyframes
-    sync = KeyframeSynchronizer(40).fit(points, keyframes=K)
+    sync = LinearSynchronizer(40).fit(points, keyframes=K)
     linear = LinearSynchronizer(40).fit_transform(points)
     expected = -least_squares(linear, sync.transform(points, keyframes=K))
     assert SpreadScorer()(sync, points, keyframes=K) == pytest.approx(expected)
     for kind in KINDS.values():
         assert SpreadScorer()(sync, points, None, keyframes=kind(K)) == pytest.approx(expected)
-    found = KeyframeSynchronizer(40).fit(points)
+    found = LinearSynchronizer(40).fit(points)
     assert SpreadScorer()(found, points) == SpreadScorer()(found, points, keyframes=None)
 
 
 def test_holdout_refits_with_the_given_key_frames(bunch, points):
-    """Refits that find their own key-frames score less."""
+    """Refits without them score less."""
     K = bunch.keyframes
-    sync = KeyframeSynchronizer(40).fit(points, keyframes=K)
+    sync = LinearSynchronizer(40).fit(points, keyframes=K)
     order, scores = np.random.RandomState(0).permutation(6), []
     for held in np.array_split(order, 3):
         shown = [np.delete(x, held, axis=1) for x in points]
         hidden = [x[:, held] for x in points]
-        blind = KeyframeSynchronizer(40).fit(shown, keyframes=K)
+        blind = LinearSynchronizer(40).fit(shown, keyframes=K)
         match = blind.match(shown, keyframes=K)
         scores.append(-least_squares(blind.fit(hidden).normalize(hidden), match.warp(hidden)))
     score = FeatureHoldoutScorer()(sync, points, keyframes=K)
     assert score == pytest.approx(np.mean(scores))
-    found = KeyframeSynchronizer(40).fit(points)
+    found = LinearSynchronizer(40).fit(points)
     assert FeatureHoldoutScorer()(found, points) < score
 
 
 @pytest.mark.parametrize("scorer", SCORERS)
 def test_missing_key_frames_are_refused_with_advice(scorer, bunch, points):
-    sync = KeyframeSynchronizer(40).fit(points, keyframes=bunch.keyframes)
+    sync = LinearSynchronizer(40).fit(points, keyframes=bunch.keyframes)
     name = scorer.__name__
     with pytest.raises(ValueError, match="fitted with key-frames") as error:
         scorer()(sync, points)
@@ -212,7 +211,7 @@ def test_key_frames_are_refused_if_match_does_not_accept_them(scorer, bunch, poi
         scorer()(sync, points, key_frames=bunch.keyframes)
 
 
-class EventSynchronizer(KeyframeSynchronizer):
+class EventSynchronizer(LinearSynchronizer):
     """A synchronizer that requires metadata of another name."""
 
     def fit(self, X, y=None, *, events):
@@ -226,7 +225,7 @@ class EventSynchronizer(KeyframeSynchronizer):
 def test_metadata_may_have_any_name(scorer, bunch, points):
     K = bunch.keyframes
     sync = EventSynchronizer(40).fit(points, events=K)
-    plain = KeyframeSynchronizer(40).fit(points, keyframes=K)
+    plain = LinearSynchronizer(40).fit(points, keyframes=K)
     expected = scorer()(plain, points, keyframes=K)
     assert scorer()(sync, points, events=K) == expected
 
@@ -260,7 +259,7 @@ def test_key_frames_are_split_with_the_performances(scorer, kind, bunch, points)
     K, expected = bunch.keyframes, []
     for train, test in KFold(3).split(points):
         seen, new = ([points[i] for i in part] for part in (train, test))
-        sync = KeyframeSynchronizer(40).fit(seen, keyframes=K[train])
+        sync = LinearSynchronizer(40).fit(seen, keyframes=K[train])
         expected.append(scorer()(sync, new, keyframes=K[test]))
     scores = cross_val_score(
         requesting_sync(), points, cv=KFold(3), scoring=requesting(scorer),
@@ -294,7 +293,7 @@ def test_several_scorers_with_aliases_and_jobs(bunch, points):
     }
     results = [
         cross_validate(
-            KeyframeSynchronizer(40).set_fit_request(keyframes="marks"), points, cv=2,
+            LinearSynchronizer(40).set_fit_request(keyframes="marks"), points, cv=2,
             scoring=scoring, params={"marks": bunch.keyframes}, n_jobs=n_jobs,
             error_score="raise",
         )
@@ -330,7 +329,7 @@ def test_set_score_request_needs_metadata_routing():
 @pytest.mark.parametrize("scorer", SCORERS)
 def test_scorer_keeps_requests_when_cloned_and_pickled(scorer, bunch, points):
     scoring = scorer("sobolev").set_score_request(keyframes=True)
-    sync = KeyframeSynchronizer(40).fit(points, keyframes=bunch.keyframes)
+    sync = LinearSynchronizer(40).fit(points, keyframes=bunch.keyframes)
     expected = scoring(sync, points, keyframes=bunch.keyframes)
     nested = clone(GridSearchCV(sync, {"n_frames": [40]}, scoring=scoring)).scoring
     for copy in (clone(scoring), pickle.loads(pickle.dumps(scoring)), nested):

@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
     find_departures,
@@ -303,9 +302,9 @@ def test_detector_in_cross_validation_with_wrong_performances(detector):
 @pytest.mark.parametrize("routed", [False, True])
 def test_key_frames_reach_the_synchronizer(routed):
     marked = make_bending(8, random_state=0)
-    how = "keyframes" if routed else "keyframesynchronizer__keyframes"
+    how = "keyframes" if routed else "linearsynchronizer__keyframes"
     with config_context(enable_metadata_routing=routed):
-        sync = KeyframeSynchronizer(30)
+        sync = LinearSynchronizer(30)
         if routed:
             sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
         steps = DirectionCosines(marked.skeleton), ASpace(3), sync, ActionModel()

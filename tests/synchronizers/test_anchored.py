@@ -1,4 +1,4 @@
-"""Key-frames that are given to dense matching: exact, soft, of a few trials, and wrong."""
+"""Key-frames that synchronizers are given: exact, soft, of a few trials, and wrong."""
 
 import numpy as np
 import pandas as pd
@@ -8,7 +8,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     OnlineSynchronizer,
     PartSynchronizer,
@@ -36,10 +35,18 @@ def at_keyframes(sync, match):
     return np.array([np.interp(sync.keyframes_, frames, t) for t in match.times]) / frames[-1]
 
 
-@pytest.mark.parametrize("params", [{}, {"refine": True}, {"metric": None}])
-def test_exact_keyframes_are_met(bunch, params):
+SYNCHRONIZERS = {
+    "linear": LinearSynchronizer(P),
+    "dense": DenseSynchronizer(P),
+    "refined": DenseSynchronizer(P, refine=True),
+    "without a metric": DenseSynchronizer(P, metric=None),
+}
+
+
+@pytest.mark.parametrize("name", SYNCHRONIZERS)
+def test_exact_keyframes_are_met(bunch, name):
     K = bunch.keyframes[:, [1, 3]]
-    sync = DenseSynchronizer(P, **params).fit(bunch.data, keyframes=K)
+    sync = clone(SYNCHRONIZERS[name]).fit(bunch.data, keyframes=K)
     match = sync.match(bunch.data, keyframes=K)
     np.testing.assert_allclose(at_keyframes(sync, match), shares(bunch, K), atol=1e-9)
     assert (np.diff(match.times) >= 0).all()
@@ -47,7 +54,7 @@ def test_exact_keyframes_are_met(bunch, params):
     np.testing.assert_allclose(sync.keyframes_, own)
     warped = sync.transform(bunch.data, keyframes=K)
     np.testing.assert_array_equal(warped, match.warp(bunch.data))
-    again = DenseSynchronizer(P, **params).fit_transform(bunch.data, keyframes=K)
+    again = clone(sync).fit_transform(bunch.data, keyframes=K)
     np.testing.assert_array_equal(again, warped)
 
 
@@ -63,25 +70,33 @@ def test_nothing_given_and_nothing_known_give_the_same(bunch):
     np.testing.assert_allclose(sync.transform(bunch.data), plain.transform(bunch.data))
 
 
-def test_a_row_that_is_not_known_may_be_none(bunch):
+@pytest.mark.parametrize("name", ["linear", "dense"])
+def test_a_row_that_is_not_known_may_be_none(bunch, name):
     K = [list(row) for row in bunch.keyframes[:, :2]]
     K[3], K[5][1] = None, np.nan
-    sync = DenseSynchronizer(P).fit(bunch.data, keyframes=K)
+    sync = clone(SYNCHRONIZERS[name]).fit(bunch.data, keyframes=K)
     met = at_keyframes(sync, sync.match(bunch.data, keyframes=K))
     wanted = shares(bunch, bunch.keyframes[:, :2])
     known = np.ones_like(wanted, dtype=bool)
     known[3], known[5, 1] = False, False
     np.testing.assert_allclose(met[known], wanted[known], atol=1e-9)
-    assert np.abs(met - wanted)[~known].max() < 0.05
+    if name == "linear":
+        # Evenly between what is known.
+        np.testing.assert_allclose(met[3], sync.keyframes_ / (P - 1))
+    else:
+        assert np.abs(met - wanted)[~known].max() < 0.05
 
 
+@pytest.mark.parametrize("name", ["linear", "dense"])
 @pytest.mark.parametrize("pattern", [4, "array"])
-def test_keyframes_of_a_pattern_without_any_are_learnt(bunch, pattern):
+def test_keyframes_of_a_pattern_without_any_are_learnt(bunch, pattern, name):
     K, truth = bunch.keyframes[:, 1:4].copy(), shares(bunch, bunch.keyframes[:, 1:4])[4]
     K[4] = np.nan
     if pattern == "array":
         pattern = np.asarray(bunch.data[4])
-    sync = DenseSynchronizer(P, pattern=pattern).fit(bunch.data, keyframes=K)
+    sync = clone(SYNCHRONIZERS[name]).set_params(pattern=pattern).fit(bunch.data, keyframes=K)
+    if name == "linear":
+        truth = np.nanmedian(shares(bunch, K), axis=0)
     np.testing.assert_allclose(sync.keyframes_ / (P - 1), truth, atol=0.015)
     known = np.arange(9) != 4
     met = at_keyframes(sync, sync.match(bunch.data, keyframes=K))
@@ -166,7 +181,7 @@ def test_seconds_and_frames_are_the_same(bunch):
     for rate in (100.0, rates):
         seconds = K / np.broadcast_to(rate, 9)[:, np.newaxis]
         given = {"keyframes": seconds, "frame_rate": rate}
-        for sync in (DenseSynchronizer(P), KeyframeSynchronizer(P)):
+        for sync in (DenseSynchronizer(P), LinearSynchronizer(P)):
             expected = clone(sync).fit(bunch.data, keyframes=K).match(bunch.data, keyframes=K)
             found = sync.fit(bunch.data, **given).match(bunch.data, **given)
             np.testing.assert_allclose(found.times, expected.times, atol=1e-9)
@@ -230,8 +245,6 @@ def test_bad_keyframes_are_refused(name, bunch):
 
 
 def test_keyframes_need_a_fit_with_some(bunch):
-    sync = DenseSynchronizer(P).fit(bunch.data)
-    with pytest.raises(ValueError, match="fitted without any"):
-        sync.match(bunch.data, keyframes=bunch.keyframes)
-    with pytest.raises(TypeError, match="keyframes"):
-        LinearSynchronizer(P).fit(bunch.data, keyframes=bunch.keyframes)
+    for sync in (DenseSynchronizer(P), LinearSynchronizer(P)):
+        with pytest.raises(ValueError, match="fitted without any"):
+            sync.fit(bunch.data).match(bunch.data, keyframes=bunch.keyframes)

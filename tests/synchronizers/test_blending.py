@@ -9,7 +9,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
     Skeleton,
@@ -476,8 +475,8 @@ def test_refuses_postures_in_another_order(bending):
 
 def test_keyframes_are_passed_to_the_match(bending):
     X, keyframes = bending.data[:4], bending.keyframes[:4]
-    pipe = make_pipeline(DirectionCosines(bending.skeleton), KeyframeSynchronizer())
-    pipe.fit(X, keyframesynchronizer__keyframes=keyframes)
+    pipe = make_pipeline(DirectionCosines(bending.skeleton), LinearSynchronizer())
+    pipe.fit(X, linearsynchronizer__keyframes=keyframes)
     found = blend_performances(pipe, X, [0, 1, 0, 0], keyframes=keyframes)
     np.testing.assert_allclose(found, X[1], atol=1e-12)
     with pytest.raises(ValueError, match=r"blend_performances\(estimator, X, keyframes="):

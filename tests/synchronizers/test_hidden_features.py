@@ -9,7 +9,6 @@ from sklearn.pipeline import make_pipeline
 from sklearn.utils import get_tags
 from sklearn_motionsync import (
     DenseSynchronizer,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     PartSynchronizer,
     TimingChannel,
@@ -198,7 +197,6 @@ def test_searches_and_pipelines():
 def test_tags_say_who_takes_gaps():
     takes = {name: get_tags(sync).input_tags.allow_nan for name, sync in SYNCHRONIZERS.items()}
     assert set(takes.values()) == {True}
-    assert not get_tags(KeyframeSynchronizer()).input_tags.allow_nan
 
 
 # -- what is refused ------------------------------------------------------------------------
@@ -290,7 +288,7 @@ def confidences(performances):
     return [np.isfinite(x).astype(float) for x in performances]
 
 
-@pytest.mark.parametrize("name", ["dense", "paper", "parts"])
+@pytest.mark.parametrize("name", ["dense", "linear", "paper", "parts"])
 def test_no_confidence_is_as_nan(name):
     sync, given = clone(SYNCHRONIZERS[name]), {"confidence": confidences(GAPPY)}
     expected = clone(sync).fit(GAPPY)
@@ -366,11 +364,6 @@ def test_wrong_confidence_is_refused(case):
     given, message = WRONG[case]
     with pytest.raises(ValueError, match=message):
         clone(DENSE).fit(WHOLE, confidence=given)
-
-
-def test_synchronizers_that_take_no_gaps_take_no_confidence():
-    with pytest.raises(ValueError, match=r"KeyframeSynchronizer takes no gaps.*DenseSynchronizer"):
-        KeyframeSynchronizer().fit(WHOLE, confidence=confidences(WHOLE))
 
 
 # -- displays, lags and tables --------------------------------------------------------------

@@ -11,7 +11,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
     PartSynchronizer,
@@ -141,7 +140,7 @@ def test_matches_that_do_not_tell(bending, bending_aspace):
     matches = [
         Match(np.tile(np.arange(5.0), (2, 1))),
         LinearSynchronizer(P).fit(bending_aspace[:5]).match(bending_aspace[:5]),
-        KeyframeSynchronizer(P)
+        LinearSynchronizer(P)
         .fit(bending_aspace[:5], keyframes=keyframes)
         .match(bending_aspace[:5], keyframes=keyframes),
         PartSynchronizer({"first": [0], "second": [1]})

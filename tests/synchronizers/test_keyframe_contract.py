@@ -17,7 +17,7 @@ from sklearn_motionsync import (
     ActionModel,
     DenseSynchronizer,
     FrameWise,
-    KeyframeSynchronizer,
+    LinearSynchronizer,
     Match,
     PartSynchronizer,
     TimingChannel,
@@ -46,7 +46,7 @@ SYNCHRONIZERS = {
     "exact": (DenseSynchronizer(40), SOME),
     "soft": (DenseSynchronizer(40, keyframe_std=2), SOME),
     "parts": (PartSynchronizer({"leg": [0, 1]}, synchronizer=DenseSynchronizer(40)), SOME),
-    "linear": (KeyframeSynchronizer(40), ALL),
+    "linear": (LinearSynchronizer(40), SOME),
 }
 
 

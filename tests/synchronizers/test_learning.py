@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from sklearn_motionsync import (
     DenseSynchronizer,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     PartSynchronizer,
 )
@@ -149,7 +148,6 @@ def test_constant_signals_count_for_nothing(dtype):
 SYNCHRONIZERS = [
     DenseSynchronizer(),
     LinearSynchronizer(),
-    KeyframeSynchronizer(n_keyframes=2),
     PartSynchronizer({"first": [0]}, synchronizer=DenseSynchronizer()),
 ]
 

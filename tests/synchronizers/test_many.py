@@ -12,7 +12,6 @@ from sklearn_motionsync import (
     ActionModel,
     ASpace,
     DenseSynchronizer,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     PartSynchronizer,
     to_frame,
@@ -67,7 +66,6 @@ KINDS = {
 SYNCHRONIZERS = {
     "dense": DenseSynchronizer(15),
     "linear": LinearSynchronizer(15),
-    "keyframes": KeyframeSynchronizer(15),
     "parts": PartSynchronizer({"arm": [0]}, synchronizer=DenseSynchronizer(15)),
     "outside": ShiftSynchronizer(15),
 }
@@ -207,7 +205,7 @@ def test_files_are_a_collection_for_all_estimators():
 
 def test_keyframes_are_given_for_all_files():
     knots = [[10.0, 12.0 + i % 5] for i in range(16)]
-    sync = KeyframeSynchronizer().fit(Files(X), keyframes=knots)
+    sync = LinearSynchronizer().fit(Files(X), keyframes=knots)
     expected = sync.transform(X, keyframes=knots)
     np.testing.assert_array_equal(sync.transform(Files(X), keyframes=knots), expected)
 

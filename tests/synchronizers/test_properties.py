@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
-from sklearn_motionsync import DenseSynchronizer, KeyframeSynchronizer, LinearSynchronizer
+from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
 
 # Waves of random sizes: one may be much larger than all others, with a warning.
 pytestmark = pytest.mark.filterwarnings("ignore:Feature .* of the energy:UserWarning")
@@ -16,7 +16,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:Feature .* of the energy:UserWar
 PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
 SYNCHRONIZERS = [
     LinearSynchronizer(),
-    KeyframeSynchronizer(n_keyframes=3),
     DenseSynchronizer(),
     DenseSynchronizer(refine=True),
     DenseSynchronizer(**PAPER),
@@ -122,7 +121,7 @@ def test_constant_features_change_no_warp(estimator, X, value, count):
 @few
 @given(performances(), st.integers(0, 1), st.integers(1, 3))
 def test_copies_of_features_change_no_warp(estimator, X, which, copies):
-    if isinstance(estimator, KeyframeSynchronizer | LinearSynchronizer):
+    if isinstance(estimator, LinearSynchronizer):
         copies, which = 1, slice(None)
     twice = [np.hstack([x, *[x[:, which].reshape(len(x), -1)] * copies]) for x in X]
     assert_close(times(estimator, twice), times(estimator, X))

@@ -16,7 +16,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
     PartSynchronizer,
@@ -31,6 +30,8 @@ from sklearn_motionsync.display import (
     TrellisDisplay,
 )
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
+
+from shift_synchronizer import ShiftSynchronizer
 
 
 @pytest.fixture(scope="module")
@@ -100,27 +101,27 @@ def test_rows_give_curves_followed_by_the_channel(points):
 
 def test_keyframes_are_routed_by_name_and_by_request(bunch):
     X, given = bunch.data, {"keyframes": bunch.keyframes}
-    expected = KeyframeSynchronizer(30).fit(X, **given).match(X, **given)
-    channel = TimingChannel(KeyframeSynchronizer(30)).fit(X, **given)
+    expected = LinearSynchronizer(30).fit(X, **given).match(X, **given)
+    channel = TimingChannel(LinearSynchronizer(30)).fit(X, **given)
     out = channel.transform(X, **given)
     np.testing.assert_array_equal(out[:, :, -1], expected.offsets_in("percent"))
     np.testing.assert_array_equal(channel.fit_transform(X, **given), out)
     with pytest.raises(ValueError, match="fitted with key-frames"):
         channel.transform(X)
     with pytest.raises(TypeError, match="keyframes"):
-        TimingChannel(LinearSynchronizer()).fit(X, **given)
+        TimingChannel(ShiftSynchronizer()).fit(X, **given)
     np.testing.assert_array_equal(Match.from_estimator(channel, X, **given).times, expected.times)
     with pytest.raises(TypeError, match="got 'moments', which is no argument"):
         Match.from_estimator(channel, X, moments=[1])
     assert SpreadScorer()(channel, X, **given) == SpreadScorer()(channel.synchronizer_, X, **given)
     with config_context(enable_metadata_routing=True):
-        asking = KeyframeSynchronizer(30).set_fit_request(keyframes=True)
+        asking = LinearSynchronizer(30).set_fit_request(keyframes=True)
         asking.set_transform_request(keyframes=True)
         pipe = make_pipeline(TimingChannel(asking), ActionModel())
         pipe.fit(X, **given)
         np.testing.assert_array_equal(pipe[:1].transform(X, **given), out)
         np.testing.assert_array_equal(TimingChannel(asking).fit_transform(X, **given), out)
-        fits_only = KeyframeSynchronizer(30).set_fit_request(keyframes=True)
+        fits_only = LinearSynchronizer(30).set_fit_request(keyframes=True)
         fits_only.set_transform_request(keyframes=False)
         with pytest.raises(ValueError, match="fitted with key-frames"):
             TimingChannel(fits_only).fit_transform(X, **given)
@@ -293,7 +294,7 @@ def test_errors_are_zero_where_a_warp_is_pinned(points):
                 "errors=True needs DenseSynchronizer or PartSynchronizer, .*; got "
                 f"{type(each).__name__}. Set errors=False",
             )
-            for each in (LinearSynchronizer(), KeyframeSynchronizer())
+            for each in (LinearSynchronizer(), ShiftSynchronizer())
         ),
     ],
 )

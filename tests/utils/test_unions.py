@@ -12,7 +12,6 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     JointPositions,
-    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
     find_departures,
@@ -57,10 +56,10 @@ def union(request):
 
 @pytest.mark.parametrize("routing", [False, True])
 def test_keyframes_are_routed_past_a_union(union, routing):
-    sync = KeyframeSynchronizer(30)
-    pipe = make_pipeline(union, sync).fit(BUNCH.data, keyframesynchronizer__keyframes=K)
+    sync = LinearSynchronizer(30)
+    pipe = make_pipeline(union, sync).fit(BUNCH.data, linearsynchronizer__keyframes=K)
     points = union.fit_transform(BUNCH.data)
-    expected = KeyframeSynchronizer(30).fit(points, keyframes=K).match(points, keyframes=K)
+    expected = LinearSynchronizer(30).fit(points, keyframes=K).match(points, keyframes=K)
     with config_context(enable_metadata_routing=routing):
         match = Match.from_estimator(pipe, BUNCH.data, keyframes=K)
         display = SynchronizationDisplay.from_estimator(pipe, BUNCH.data, keyframes=K)
@@ -71,12 +70,12 @@ def test_keyframes_are_routed_past_a_union(union, routing):
 
 
 def test_detector_of_a_union_takes_keyframes(union):
-    steps = KeyframeSynchronizer(30), ActionModel()
+    steps = LinearSynchronizer(30), ActionModel()
     detector = ActionDetector(make_pipeline(union, *steps))
-    detector.fit(BUNCH.data, keyframesynchronizer__keyframes=K)
+    detector.fit(BUNCH.data, linearsynchronizer__keyframes=K)
     plain = ActionDetector(make_pipeline(*steps))
     points = union.fit_transform(BUNCH.data)
-    plain.fit(points, keyframesynchronizer__keyframes=K)
+    plain.fit(points, linearsynchronizer__keyframes=K)
     np.testing.assert_array_equal(
         detector.score_samples(BUNCH.data, keyframes=K), plain.score_samples(points, keyframes=K)
     )

@@ -1,4 +1,4 @@
-"""KeyframeSynchronizer: given key-frames, found ones, and metadata routing."""
+"""LinearSynchronizer between key-frames, metadata routing, and key-frames that are refused."""
 
 import numpy as np
 import pandas as pd
@@ -11,41 +11,38 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     LinearSynchronizer,
 )
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error
-from sklearn_motionsync.synchronizers.keyframes import curvature_keyframes
-
-from oracle import slow_filter
 
 
 def test_given_keyframes_coincide(bending, bending_aspace):
-    sync = KeyframeSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
+    sync = LinearSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
     offsets, times, _ = sync.match(bending_aspace, keyframes=bending.keyframes)
     lengths = [len(x) for x in bending_aspace]
     pattern = bending.keyframes[sync.pattern_index_] * 99 / (lengths[sync.pattern_index_] - 1)
     np.testing.assert_allclose(sync.keyframes_, pattern)
-    # Key-frames lie between whole frames, where warps have a corner.
-    assert keyframe_error(times, bending.keyframes, pattern, lengths) < 0.15
+    assert keyframe_error(times, bending.keyframes, pattern, lengths) < 1e-9
     assert not offsets[sync.pattern_index_].any()
     assert (np.diff(times) >= 0).all()
 
 
 def test_whole_keyframes_coincide_exactly():
     X = [np.arange(11.0)[:, None] ** 2, np.arange(21.0)[:, None]]
-    sync = KeyframeSynchronizer(11, pattern=0).fit(X, keyframes=[[4, 6], [10, 16]])
+    sync = LinearSynchronizer(11, pattern=0).fit(X, keyframes=[[4, 6], [10, 16]])
     times = sync.match(X, keyframes=[[4, 6], [10, 16]]).times[1]
     np.testing.assert_allclose(times, np.interp(np.arange(11), [0, 4, 6, 10], [0, 5, 8, 10]))
     out = sync.transform(X, keyframes=[[4, 6], [10, 16]])
     np.testing.assert_allclose(out[1][[0, 4, 6, 10], 0], [0, 10, 16, 20])
 
 
-def test_pattern_is_the_median_after_matching_by_keyframes(bending, bending_aspace):
-    X, K = bending_aspace[:6], bending.keyframes[:6]
-    sync = KeyframeSynchronizer(60).fit(X, keyframes=K)
-    knots = np.array([k * 59 / (len(x) - 1) for k, x in zip(K, X, strict=True)])
-    centre, p = knots.mean(axis=0), np.arange(60)
+def test_pattern_is_the_median_after_matching_by_keyframes(bending_aspace):
+    X, p = bending_aspace[:6], np.arange(60)
+    # Their mean is a whole frame, where a warp has its corner.
+    centre = np.array([9, 20, 31, 45])
+    knots = centre + np.array([[-3], [-2], [-1], [1], [2], [3]]) * [1, -1, 2, 1]
+    K = [k * (len(x) - 1) / 59 for k, x in zip(knots, X, strict=True)]
+    sync = LinearSynchronizer(60).fit(X, keyframes=K)
     matched = []
     for x, k in zip(X, knots, strict=True):
         tau = np.interp(p, [0, *centre, 59], [0, *k, 59])
@@ -56,106 +53,56 @@ def test_pattern_is_the_median_after_matching_by_keyframes(bending, bending_aspa
     assert sync.pattern_index_ == np.argmin(np.sum(D, axis=1))
 
 
-def test_timing_errors_of_given_and_found_keyframes(bending, bending_aspace):
-    key = KeyframeSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
+def test_a_key_frame_that_is_not_known_is_left_out():
+    """The pattern lacks the second one: the others meet it at 9, 10 and 12, by the first."""
+    rows = [[4, np.nan], [8, 18], [8, 19], [6, 17]]
+    X = [np.arange(float(n))[:, None] for n in (21, 41, 41, 31)]
+    sync = LinearSynchronizer(21, pattern=0).fit(X, keyframes=rows)
+    lengths = [41, 41, 31]
+    met = [
+        np.interp(k * 20 / (n - 1), [0, a * 20 / (n - 1), 20], [0, 4, 20])
+        for (a, k), n in zip(rows[1:], lengths, strict=True)
+    ]
+    np.testing.assert_allclose(sync.keyframes_, [4, np.median(met)])
+    shown = [[np.nan, 20], None]
+    times = sync.match(X[1:3], keyframes=shown).times
+    np.testing.assert_allclose(np.interp(sync.keyframes_[1], np.arange(21), times[0]), 10)
+    np.testing.assert_allclose(times[0, :9], np.arange(9) * 10 / sync.keyframes_[1])
+    np.testing.assert_array_equal(times[1], np.arange(21))
+
+
+def test_gaps_and_key_frames_together(bending, bending_aspace):
+    X, K = [x.copy() for x in bending_aspace[:6]], bending.keyframes[:6]
+    X[2][10:20, 1] = np.nan
+    sync = LinearSynchronizer(60).fit(X, keyframes=K)
+    expected = LinearSynchronizer(60, pattern=sync.pattern_index_).fit(X, keyframes=K)
+    match = sync.match(X, keyframes=K)
+    np.testing.assert_array_equal(match.times, expected.match(X, keyframes=K).times)
+    warped = sync.transform(X, keyframes=K)
+    assert np.isnan(warped).sum() == np.isnan(warped[2, :, 1]).sum() > 0
+    filled = sync.transform(X, keyframes=K, fill="model")
+    assert np.isfinite(filled).all()
+    np.testing.assert_array_equal(filled[~np.isnan(warped)], warped[~np.isnan(warped)])
+
+
+def test_timing_errors_with_keyframes_and_without(bending, bending_aspace):
+    key = LinearSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
     times = {
         "keyframes": key.match(bending_aspace, keyframes=bending.keyframes).times,
         "dense": DenseSynchronizer(100).fit(bending_aspace).match(bending_aspace).times,
-        "found": KeyframeSynchronizer(100).fit(bending_aspace).match(bending_aspace).times,
         "linear": LinearSynchronizer(100).fit(bending_aspace).match(bending_aspace).times,
     }
     errors = {name: group_timing_error(t, bending.times) for name, t in times.items()}
     assert errors["keyframes"] < 0.5
     assert errors["dense"] < 0.3
-    assert errors["found"] < errors["linear"]
-
-
-def test_curvature_keyframes_are_corners():
-    """A path along three edges of a box has two corners."""
-    t = np.linspace(0, 3, 91)[:, None]
-    path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1), np.clip(t - 2, 0, 1)])
-    np.testing.assert_allclose(curvature_keyframes(path, 2), [30, 60], atol=1)
-
-
-@pytest.mark.parametrize("n_frames", [20, 40, 101])
-def test_first_keyframe_has_the_largest_curvature(n_frames):
-    """sqrt(|v|^2 |a|^2 - (v.a)^2) / |v|^3, with a tenth of the mean |v|^2 added to |v|^2."""
-    rng, t, cases = np.random.default_rng(n_frames), np.linspace(0, 1, n_frames), 0
-    for _ in range(40):
-        waves = np.sin(np.outer(t, rng.uniform(2, 20, 3)) + rng.uniform(0, 6, 3))
-        path = waves @ rng.standard_normal((3, 3))
-        path -= path.mean(axis=0)
-        v, a = (slow_filter(path, 0.03 * (n_frames - 1), order) for order in (1, 2))
-        vv = (v**2).sum(axis=1)
-        bend = np.linalg.norm(np.cross(v, a), axis=1) / (vv + 0.1 * vv.mean()) ** 1.5
-        # Key-frames keep a distance from both ends.
-        if n_frames / 6 < bend.argmax() < n_frames - 1 - n_frames / 6:
-            cases += 1
-            sync = KeyframeSynchronizer(n_keyframes=1).fit([path])
-            assert sync.keyframes_.tolist() == [bend.argmax()]
-    assert cases > 10
-
-
-@pytest.mark.parametrize("n_keyframes", [2, 5, 9])
-def test_reversed_path_has_the_same_keyframes(n_keyframes):
-    rng = np.random.default_rng(0)
-    for n_frames in range(30, 70):
-        path = np.cumsum(rng.standard_normal((n_frames, 3)), axis=0)
-        there, back = (
-            KeyframeSynchronizer(n_keyframes=n_keyframes).fit([x]).keyframes_
-            for x in (path, path[::-1])
-        )
-        assert len(there) == n_keyframes
-        np.testing.assert_array_equal(back, n_frames - 1 - there[::-1])
-
-
-def test_equal_postures_are_matched_in_order():
-    """Twice around a triangle: each corner is passed twice."""
-    corners = np.array([[0.0, 0], [1, 0], [0.5, 0.8], [0, 0], [1, 0], [0.5, 0.8], [0, 0]])
-    turns = [20, 40, 60, 80, 100], [24, 36, 66, 76, 98], [14, 40, 52, 88, 106]
-    X = [
-        np.column_stack([np.interp(np.arange(121), [0, *k, 120], way) for way in corners.T])
-        for k in turns
-    ]
-    sync = KeyframeSynchronizer(pattern=0, n_keyframes=5).fit(X)
-    np.testing.assert_allclose(sync.keyframes_, turns[0], atol=1)
-    times = sync.match(X).times[:, sync.keyframes_.astype(int)]
-    np.testing.assert_allclose(times, turns, atol=4)
-
-
-def test_shifted_path_has_the_same_keyframes():
-    """Twice around an ellipse that is shifted: key-frames are at the same ends."""
-    t = np.linspace(0, 1, 121)
-    phase = np.pi / 2 + 4 * np.pi * np.stack([t, t + 0.03 * np.sin(2 * np.pi * t)])
-    pattern, other = np.stack([2 * np.cos(phase), np.sin(phase)], axis=2)
-    sync = KeyframeSynchronizer(pattern=0, n_keyframes=4).fit([pattern, other + [0, 0.5]])
-    np.testing.assert_allclose(sync.keyframes_, [15, 45, 75, 105], atol=1)
-    landed = sync.match([pattern, other + [0, 0.5]]).times[:, sync.keyframes_.astype(int)]
-    shown = [np.interp(f, np.arange(121), p) for f, p in zip(landed, phase, strict=True)]
-    np.testing.assert_allclose(shown, [np.pi * np.arange(1, 5)] * 2, atol=0.15)
-
-
-def test_tremor_at_rest_is_no_keyframe():
-    t, rng = np.linspace(0, 3, 151)[:, None], np.random.default_rng(0)
-    path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1)])
-    path[100:] += 0.003 * rng.standard_normal((51, 2))
-    sync = KeyframeSynchronizer(n_keyframes=1).fit([path])
-    np.testing.assert_allclose(sync.keyframes_, [50], atol=1)
-
-
-@pytest.mark.parametrize("n_frames", [3, 5, 9])
-def test_number_of_keyframes_is_limited_by_the_frames(n_frames):
-    X = [np.random.default_rng(i).standard_normal((n_frames, 2)) for i in range(3)]
-    sync = KeyframeSynchronizer(n_keyframes=20).fit(X)
-    assert len(sync.keyframes_) == n_frames - 2
-    np.testing.assert_allclose(sync.transform(X), X)
+    assert errors["linear"] > 2
 
 
 # -- metadata routing -------------------------------------------------------------------
 
 
 def make_pipe(bunch):
-    sync = KeyframeSynchronizer(60)
+    sync = LinearSynchronizer(60)
     sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
     return make_pipeline(DirectionCosines(bunch.skeleton), ASpace(4), sync, ActionModel())
 
@@ -164,7 +111,7 @@ def test_keyframes_are_routed_in_a_pipeline(bending):
     with config_context(enable_metadata_routing=True):
         pipe = make_pipe(bending).fit(bending.data, keyframes=bending.keyframes)
         points = pipe[:-2].transform(bending.data)
-        direct = KeyframeSynchronizer(60).fit_transform(points, keyframes=bending.keyframes)
+        direct = LinearSynchronizer(60).fit_transform(points, keyframes=bending.keyframes)
         np.testing.assert_array_equal(pipe[-1].mean_, ActionModel().fit(direct).mean_)
         out = pipe[:-1].transform(bending.data, keyframes=bending.keyframes)
         np.testing.assert_array_equal(out, direct)
@@ -198,18 +145,17 @@ def test_keyframes_are_split_in_cross_validation(bending):
         ([[2, 5], [2, 5, 7]], "Performance 1: key-frames must be 2"),
         ([[2, 5], [2, 9]], "Performance 1: .* both excluded"),
         ([[0, 5], [2, 5]], "Performance 0: "),
-        ([[2, 5], [2, np.nan]], "Performance 1: "),
         ([[2, 5], 3], "Performance 1: "),
     ],
 )
 def test_fit_refuses_invalid_keyframes(keyframes, message):
     X = [np.arange(10.0)[:, None]] * 2
     with pytest.raises(ValueError, match=message):
-        KeyframeSynchronizer().fit(X, keyframes=keyframes)
+        LinearSynchronizer().fit(X, keyframes=keyframes)
 
 
 def test_transform_needs_keyframes_after_a_fit_with_them(bending):
-    sync = KeyframeSynchronizer().fit(bending.data, keyframes=bending.keyframes)
+    sync = LinearSynchronizer().fit(bending.data, keyframes=bending.keyframes)
     with pytest.raises(ValueError, match="give those of these performances too"):
         sync.transform(bending.data)
     with pytest.raises(ValueError, match="must be 5 increasing"):
@@ -236,9 +182,9 @@ def test_transform_needs_keyframes_after_a_fit_with_them(bending):
 def test_keyframes_in_seconds_are_refused(n_frames, frames, is_refused):
     X = [np.arange(50.0)[:, None] ** 2, np.arange(float(n_frames))[:, None]]
     late = [20 + 5 * k for k in range(len(frames))]
-    sync = KeyframeSynchronizer().fit(X[:1] * 2, keyframes=[late, late])
+    sync = LinearSynchronizer().fit(X[:1] * 2, keyframes=[late, late])
     calls = [
-        lambda: KeyframeSynchronizer().fit(X, keyframes=[late, frames]),
+        lambda: LinearSynchronizer().fit(X, keyframes=[late, frames]),
         lambda: sync.match(X, keyframes=[late, frames]),
         lambda: sync.transform(X, keyframes=[late, frames]),
         lambda: keyframe_error([range(50)] * 2, [late, frames], late, [50, n_frames]),
@@ -257,13 +203,13 @@ def test_events_of_other_rows_are_no_keyframes():
     for x in takes:
         x.attrs["events"] = [{"label": "off", "frame": 30.5}]
     keyframes = [[x.attrs["events"][0]["frame"]] for x in takes]
-    sync = KeyframeSynchronizer().fit(takes, keyframes=keyframes)
+    sync = LinearSynchronizer().fit(takes, keyframes=keyframes)
     for rows, words in (
         (slice(10, None), "row 0 is frame 10"),
         (slice(0, None, 2), "1 is frame 2"),
     ):
         X = [*takes[:2], takes[2].iloc[rows]]
-        for call in (KeyframeSynchronizer().fit, sync.match, sync.transform):
+        for call in (LinearSynchronizer().fit, sync.match, sync.transform):
             with pytest.raises(ValueError, match=f"Performance 2: .*{words} of the recording"):
                 call(X, keyframes=keyframes)
             table = pd.concat(X, keys=range(3))
@@ -272,6 +218,6 @@ def test_events_of_other_rows_are_no_keyframes():
                 call(table, keyframes=keyframes)
             call([x.reset_index(drop=True) for x in X], keyframes=[[30.5], [30.5], [20.5]])
         # Without key-frames, or events to take them from, rows count.
-        KeyframeSynchronizer().fit(X)
+        LinearSynchronizer().fit(X)
         X[2].attrs = {}
         sync.match(X, keyframes=[[30.5], [30.5], [20.5]])
