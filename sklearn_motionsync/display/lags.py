@@ -20,7 +20,6 @@ from .time_axis import TimeAxis
 __all__ = ["LagDisplay"]
 
 _UNITS = {"frames": "frames", "percent": "% of the time", "seconds": "s"}
-_REFERENCES = {"rest": "the rest of the body", "body": "the whole body"}
 # The largest number of curves in a row.
 _CURVES_A_ROW = 3
 
@@ -83,7 +82,6 @@ class LagDisplay:
         X: PerformancesLike,
         *,
         groups: Labels | None = None,
-        against: str = "rest",
         unit: Unit = "percent",
         frame_rate: float | ValuesLike | None = None,
         ax: AxesLike | None = None,
@@ -100,8 +98,6 @@ class LagDisplay:
             As the estimator takes them.
         groups : array-like, shape (n_sequences,), default=None
             The subject of each performance.
-        against : str, default="rest"
-            The reference: ``"rest"``, ``"body"``, or the name of a part.
         unit : {"frames", "percent", "seconds"}, default="percent"
             Unit of the lags.
         frame_rate : float or array-like (n_sequences,), default=None
@@ -127,7 +123,6 @@ class LagDisplay:
         lags = reached.synchronizer.lags(
             reached.performances,
             groups,
-            against=against,
             unit=unit,
             frame_rate=rates_of(X, frame_rate, unit),
         )
@@ -281,11 +276,10 @@ class LagDisplay:
 
     def _describe(self):
         n_sequences, n_parts = self.lags.values.shape[:2]
-        behind = _REFERENCES.get(self.lags.against, f"the {self.lags.against}")
         lagging = f"{n_parts} parts" if n_parts > 1 else self.lags.parts[0]
         people = ""
         if self.lags.groups is not None:
             n_people = len(np.unique(self.lags.groups))
             people = " of 1 person" if n_people == 1 else f" of {n_people} people"
         count = counted(n_sequences, "trial")
-        return f"{lagging} behind {behind}, {count}{people}"
+        return f"{lagging} behind the rest of the body, {count}{people}"

@@ -32,8 +32,6 @@ class Lags(NamedTuple):
         The lags: positive where a part is late, negative where it leads.
     parts : list of str
         Names of the parts.
-    against : str
-        The reference: ``"rest"``, ``"body"``, or the name of a part.
     unit : {"frames", "percent", "seconds"}
         Unit of the values.
     groups : ndarray of int, shape (n_sequences,), default=None
@@ -51,7 +49,7 @@ class Lags(NamedTuple):
     >>> from sklearn_motionsync import Lags
     >>> values = np.repeat([0.0, 0.2, 4.0, 4.4], 5).reshape(4, 1, 5)
     >>> groups = np.array([0, 0, 1, 1])
-    >>> lags = Lags(values, ["arm"], "rest", "frames", groups, ["ann", "bob"])
+    >>> lags = Lags(values, ["arm"], "frames", groups, ["ann", "bob"])
     >>> lags.summary()[["mean", "sd_within", "sd_between", "icc"]].round(2)
           mean  sd_within  sd_between   icc
     part
@@ -65,7 +63,6 @@ class Lags(NamedTuple):
 
     values: np.ndarray
     parts: list[str]
-    against: str
     unit: Unit
     groups: np.ndarray | None = None
     people: list | None = None
@@ -116,7 +113,7 @@ class Lags(NamedTuple):
         n_sequences, n_parts, n_frames = self.values.shape
         return (
             f"Lags({counted(n_parts, 'part')} of {counted(n_sequences, 'performance')} on "
-            f"{n_frames} frames, behind {self.against!r}, in {self.unit})"
+            f"{n_frames} frames, in {self.unit})"
         )
 
     def _spread(self, values):

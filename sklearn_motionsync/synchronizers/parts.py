@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from numbers import Real
@@ -47,8 +46,8 @@ from .portions import warp_in_portions
 
 __all__ = ["PartSynchronizer"]
 
-# What a part can be compared with besides another part; no part may have such a name.
-_REST, _BODY = _REFERENCES = ("rest", "body")
+# What is in no part; no part may have this name.
+_REST = "rest"
 # Fitted attributes of the synchronizer of the whole body that are also those of the parts.
 _SHARED = (
     "pattern_",
@@ -296,7 +295,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         X: PerformancesLike,
         groups: Labels | None = None,
         *,
-        against: str = "rest",
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
@@ -305,9 +303,10 @@ class PartSynchronizer(AnchoredSynchronizer):
 
         Offsets of every part are counted from their mean over training performances: where people
         move an arm late, an arm that is as late has no lag. The rest of the body is late by what
-        its parts have in common, so one part that is late, or two, leave the lags of the others as
-        they are. How many parts must agree is learnt: all of them where parts of the training
-        performances differ as much as they share, a majority where they move together.
+        the other parts that move have in common, features of no part among them. So one part that
+        is late, or two, leave the lags of the others as they are. How many parts must agree is
+        learnt: all of them where parts of the training performances differ as much as they share, a
+        majority where they move together.
         Coupling would draw late parts back, and others along: lags are those of parts that are
         matched without it, unlike those of `match_parts`. An infinite coupling leaves none.
 
@@ -318,10 +317,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         groups : array-like of shape (n_sequences,), default=None
             The subject of each performance: then the report separates the spread within and
             between subjects.
-        against : {"rest", "body"} or name of a part, default="rest"
-            The reference. ``"rest"``: what the other parts that move have in common, features of no
-            part among them. ``"body"``: the whole body, whose warp follows a part that moves most.
-            A name: that part.
         unit : {"frames", "percent", "seconds"}, default="frames"
             Unit of the lags, as in ``Match.offsets_in``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
@@ -338,35 +333,35 @@ class PartSynchronizer(AnchoredSynchronizer):
         Raises
         ------
         ValueError
-            If there are no parts, no such reference, or not one group a performance.
+            If there are no parts, or not one group a performance.
         """
         performances = self.check_performances(X)
-        self._check_reference(against)
+        if not self.parts_:
+            raise ValueError(
+                "There are no parts: they are not given, and the features are not recognised as "
+                "direction cosines. Fit again with parts={name: features}, or skeleton.parts()."
+            )
         people = None
         if groups is not None:
             groups, people = encode_groups(groups, len(performances))
         body = self.match(performances, **self._given(X, keyframes, frame_rate))
-        matches = self._match_parts(performances, body, self._warpers, free=True) | {_BODY: body}
+        matches = self._match_parts(performances, body, self._warpers, free=True)
         lengths, rates = [len(x) for x in performances], rates_of(X, frame_rate, unit)
         offsets = {}
         for name, match in matches.items():
             usual = self._usual(name, match).offsets_in(unit, lengths, rates)
             offsets[name] = match.offsets_in(unit, lengths, rates) - usual
-        names = [name for name in self.parts_ if name != against]
-        if against == _REST:
-            moving = [name for name, warper in self._warpers.items() if warper is not None]
-            # What does not move has no lag.
-            references = [
-                common_delay([offsets[x] for x in moving if x != name], self._people.apart)
-                if name in moving
-                else offsets[name]
-                for name in names
-            ]
-        else:
-            references = [offsets[against]] * len(names)
-        lags = [offsets[name] - x for name, x in zip(names, references, strict=True)]
+        moving = [name for name, warper in self._warpers.items() if warper is not None]
+        # What does not move has no lag.
+        lags = [
+            offsets[name]
+            - common_delay([offsets[x] for x in moving if x != name], self._people.apart)
+            if name in moving
+            else np.zeros_like(offsets[name])
+            for name in self.parts_
+        ]
         values = np.stack(lags, axis=1)
-        return Lags(values, names, against, unit, groups, people, performances.labels)
+        return Lags(values, [*self.parts_], unit, groups, people, performances.labels)
 
     def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
         performances = with_confidence(performances, confidence)
@@ -404,18 +399,6 @@ class PartSynchronizer(AnchoredSynchronizer):
             matches[name] = Match(times, warper.matcher.features.back(distances))
         return matches
 
-    def _check_reference(self, against):
-        if not self.parts_:
-            raise ValueError(
-                "There are no parts: they are not given, and the features are not recognised as "
-                "direction cosines. Fit again with parts={name: features}, or skeleton.parts()."
-            )
-        known = [*_REFERENCES, *self.parts_]
-        if not (isinstance(against, str) and against in known):
-            raise ValueError(f"against must be one of {known}, got {reprlib.repr(against)}.")
-        if [against] == [*self.parts_]:
-            raise ValueError(f"{against!r} is the only part: use against='rest' or 'body'.")
-
 
 class PartsOfPeople(NamedTuple):
     """How parts of training performances move.
@@ -423,7 +406,7 @@ class PartsOfPeople(NamedTuple):
     Attributes
     ----------
     times : dict of str to ndarray (P,)
-        The mean warp of each part, of the features of no part as ``"rest"``, and of the ``"body"``.
+        The mean warp of each part, and of the features of no part as ``"rest"``.
     apart : float
         As of `share_apart`.
     """
@@ -499,7 +482,7 @@ def learn_parts(self, training, parts, coupling, progress):
     if len(of_no_part):
         features_of[_REST] = of_no_part
     warpers = dict.fromkeys(features_of)
-    warps = dict.fromkeys([*features_of, _BODY], body_times)
+    warps = dict.fromkeys(features_of, body_times)
     if coupling < math.inf:
         on_clock = normalise(trials, n_frames)
         portions = [
@@ -537,10 +520,9 @@ def choose_parts(parts, performances, names):
     names = [f"x{i}" for i in range(performances[0].shape[1])] if names is None else [*names]
     chosen, owner = {}, {}
     for part, features in parts.items():
-        if not isinstance(part, str) or part in _REFERENCES:
+        if not isinstance(part, str) or part == _REST:
             raise ValueError(
-                "The name of a part must be a string other than "
-                f"{' and '.join(map(repr, _REFERENCES))}; got {part!r}."
+                f"The name of a part must be a string other than {_REST!r}; got {part!r}."
             )
         try:
             indices = choose_features([] if features is None else features, names)

@@ -18,7 +18,7 @@ def lags():
     rng, groups = np.random.default_rng(0), np.repeat(range(4), 3)
     values = rng.normal(0, 0.3, (12, 2, N_FRAMES))
     values[:, 0, 11:] += 5
-    return Lags(values, ["arm", "leg"], "rest", "frames", groups, list("abcd"))
+    return Lags(values, ["arm", "leg"], "frames", groups, list("abcd"))
 
 
 def test_map_shows_the_mean_and_hatches_intervals_around_zero(lags):
@@ -56,8 +56,8 @@ def test_curves_show_mean_interval_and_standard_deviation(lags):
 
 
 def test_a_single_performance_has_no_interval(lags):
-    display = LagDisplay.from_predictions(Lags(lags.values[:1], lags.parts, "leg", "percent"))
-    assert display.map_ax_.get_title() == "2 parts behind the leg, 1 trial"
+    display = LagDisplay.from_predictions(Lags(lags.values[:1], lags.parts, "percent"))
+    assert display.map_ax_.get_title() == "2 parts behind the rest of the body, 1 trial"
     assert display.unsure_[0].get_paths()
     assert display.map_ax_.get_xlim() == (0, 100)
 
@@ -68,9 +68,9 @@ def test_from_estimator_of_a_pipeline_on_axes_of_the_user():
     sync = PartSynchronizer(coupling=0.01, synchronizer=body)
     pipe = make_pipeline(DirectionCosines(bunch.skeleton), sync).fit(bunch.data)
     ax = plt.figure().subplots(1, 2)[1]
-    display = LagDisplay.from_estimator(pipe, bunch.data, against="trunk", unit="frames", ax=ax)
+    display = LagDisplay.from_estimator(pipe, bunch.data, unit="frames", ax=ax)
     X = pipe[:-1].transform(bunch.data)
-    np.testing.assert_array_equal(display.lags.values, sync.lags(X, against="trunk").values)
+    np.testing.assert_array_equal(display.lags.values, sync.lags(X).values)
     assert display.figure_ is ax.figure
     assert [a.get_title() for a in display.axes_] == display.lags.parts
     tables = [pd.DataFrame(x, columns=bunch.skeleton.column_names) for x in bunch.data]

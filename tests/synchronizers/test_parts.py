@@ -303,7 +303,7 @@ def test_joint_names_are_not_parts():
         ({"arm": [1, 2], "leg": [2]}, "Feature 'x2' is in part 'arm' and again in 'leg'"),
         (
             {"rest": [1]},
-            "The name of a part must be a string other than 'rest' and 'body'; got 'rest'",
+            "The name of a part must be a string other than 'rest'; got 'rest'",
         ),
         ({1: [1]}, "The name of a part must be a string"),
         ([1], "The 'parts' parameter of PartSynchronizer"),
@@ -333,28 +333,20 @@ def test_tables_in_and_out(postures):
 
 
 def offsets_from_mean(fitted, training, X):
-    """Offsets of the parts and of the body less their means over a training set."""
-    found = fitted.match_parts(X) | {"body": fitted.match(X)}
-    usual = fitted.match_parts(training) | {"body": fitted.match(training)}
+    """Offsets of the parts less their means over a training set."""
+    found, usual = fitted.match_parts(X), fitted.match_parts(training)
     return {name: m.offsets - usual[name].offsets.mean(axis=0) for name, m in found.items()}
 
 
-def test_lags_are_differences_of_offsets_from_the_mean_of_people(fitted, postures):
+def test_lags_in_every_unit(fitted):
     new = made_postures(4, 3)
-    own = offsets_from_mean(fitted, postures, new)
-    for against in ("body", "trunk"):
-        lags = fitted.lags(new, against=against)
-        assert lags.parts == [name for name in PARTS if name != against]
-        expected = np.stack([own[name] - own[against] for name in lags.parts], axis=1)
-        np.testing.assert_allclose(lags.values, expected, atol=1e-9)
-    percent = fitted.lags(new, against="trunk", unit="percent").values
-    np.testing.assert_allclose(percent, expected * 100 / 59, atol=1e-9)
-    seconds = fitted.lags(new, against="trunk", unit="seconds", frame_rate=30).values
+    lags = fitted.lags(new)
+    assert lags.parts == [*PARTS]
+    percent = fitted.lags(new, unit="percent").values
+    np.testing.assert_allclose(percent, lags.values * 100 / 59, atol=1e-9)
+    seconds = fitted.lags(new, unit="seconds", frame_rate=30).values
     lasts = np.array([len(x) - 1 for x in new])[:, np.newaxis, np.newaxis]
     np.testing.assert_allclose(seconds, percent / 100 * lasts / 30, atol=1e-9)
-    np.testing.assert_allclose(
-        fitted.lags(postures, against="body").values.mean(axis=0), 0, atol=1e-9
-    )
 
 
 def test_reference_is_a_least_absolute_fit(fitted, postures, real_data):
@@ -438,7 +430,7 @@ def test_spread_within_and_between_subjects_agrees_with_scipy():
     own = {"a": 1.0, "b": -2.0, "c": 0.5}
     values = np.array([own[g] for g in groups])[:, np.newaxis] + rng.normal(size=(9, 6))
     codes = np.unique(groups, return_inverse=True)[1]
-    lags = Lags(values.reshape(9, 2, 3), ["arm", "leg"], "rest", "frames", codes, list("abc"))
+    lags = Lags(values.reshape(9, 2, 3), ["arm", "leg"], "frames", codes, list("abc"))
     table = lags.over_time()
     assert table.index[4] == ("leg", 1)
     for column, row in zip(values.T, table.itertuples(), strict=True):
@@ -470,7 +462,6 @@ def test_spread_is_nan_for_too_few_performances(fitted, postures):
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        ({"against": "tail"}, "against must be one of .*'rest', 'body', 'left arm'.* got 'tail'"),
         ({"unit": "hours"}, "unit must be one of"),
         ({"unit": "seconds"}, "needs X.* and frame_rate"),
     ],
