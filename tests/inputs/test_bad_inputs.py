@@ -22,10 +22,11 @@ SYNCHRONIZERS = [
     DenseSynchronizer(),
     ShiftSynchronizer(),
 ]
-# Input is checked in one place: one estimator of rows, one of sequences, and one that takes no gaps.
-SEQUENCES = [LinearSynchronizer(), KeyframeSynchronizer()]
+# Input is checked in one place: an estimator of rows and two of sequences stand for all others.
+SEQUENCES = [LinearSynchronizer(), ShiftSynchronizer()]
 ALL = [ASpace(), *SEQUENCES]
-WHOLE = [KeyframeSynchronizer(), ShiftSynchronizer()]
+# Those that take no gaps.
+WHOLE = [ShiftSynchronizer()]
 OF_EACH_KIND = [ASpace(), *SYNCHRONIZERS, TimingChannel(LinearSynchronizer()), ActionModel()]
 
 NAMES = ["hip", "knee", "ankle"]
