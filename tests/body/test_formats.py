@@ -91,9 +91,15 @@ def test_up_is_downwards_in_pictures(name):
     assert len(skeleton.column_names) == 2 * len(skeleton.joints)
 
 
-@pytest.mark.parametrize("n_dims", [3, 2])
-@pytest.mark.parametrize("spelling", [str, str.lower, str.upper, "subject 1:{}".format])
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize(
+    ("name", "spelling", "n_dims"),
+    [
+        *((name, str.lower, 3) for name in FORMATS),
+        *((name, "subject 1:{}".format, 2) for name in FORMATS),
+        ("kinect", str.upper, 3),
+        ("openpose", str, 2),
+    ],
+)
 def test_landmarks_are_recognised_in_any_spelling_and_among_other_joints(name, spelling, n_dims):
     known = ready(name, n_dims=n_dims)
     df = embedded(name, n_dims)

@@ -47,8 +47,17 @@ def people(request):
 # -- cosines of the limbs that are there --------------------------------------------------
 
 
-@pytest.mark.parametrize("part", PARTS)
-@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
+OF_PARTS = [
+    *((part, "heading") for part in PARTS),
+    *(
+        (part, reference)
+        for part in ("legs", "arms", "left half")
+        for reference in ("parent", "world")
+    ),
+]
+
+
+@pytest.mark.parametrize(("part", "reference"), OF_PARTS)
 def test_cosines_equal_those_of_the_whole_body(people, part, reference):
     skeleton, X = people
     whole = DirectionCosines(skeleton, reference).fit(X)
@@ -84,8 +93,7 @@ def test_body_without_hips_has_the_heading_of_its_shoulders():
     np.testing.assert_allclose(leg, [[0, -1, 0, 0, -1, 0]], atol=1e-12)
 
 
-@pytest.mark.parametrize("part", PARTS)
-@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
+@pytest.mark.parametrize(("part", "reference"), OF_PARTS)
 def test_postures_of_reconstructed_positions_are_the_same(people, part, reference):
     skeleton, X = people
     some = DirectionCosines(only(PARTS[part], skeleton), reference).set_output(transform="pandas")

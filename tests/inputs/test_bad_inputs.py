@@ -15,6 +15,7 @@ from sklearn_motionsync import (
     to_frame,
 )
 
+from estimators import by_name
 from shift_synchronizer import ShiftSynchronizer
 
 SYNCHRONIZERS = [
@@ -81,10 +82,6 @@ NESTED = pd.DataFrame({name: [df[name] for df in FRAMES] for name in NAMES})
 
 def masked(x):
     return np.ma.masked_where(np.arange(x.size).reshape(x.shape) == 7, x)
-
-
-def by_name(value):
-    return type(value).__name__ if hasattr(value, "get_params") else None
 
 
 def refuses(call, words, error=(ValueError, TypeError)):

@@ -105,15 +105,6 @@ def test_warning_names_four_columns_the_worst_first(tmp_path, n, names):
         read(tmp_path, storage(values, list("abcdef")))
 
 
-def test_repeated_times_are_uneven(tmp_path):
-    times = np.arange(50) / 100
-    times[7] = times[6]
-    with pytest.warns(UserWarning, match="in steps of 0 to 0.02 s"):
-        assert read(tmp_path, storage(VALUES, LABELS, times=times)).attrs["frame_rate"] is None
-    still = storage(VALUES[:1], LABELS)
-    assert read(tmp_path, still).attrs["frame_rate"] is None
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

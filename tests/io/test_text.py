@@ -121,8 +121,7 @@ def test_a_rate_is_a_number_above_0(word, rate):
 # -- tables ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("blank", [" ", "\t", "  ", " \t"])
+@pytest.mark.parametrize(("seed", "blank"), [*enumerate(2 * [" ", "\t", "  ", " \t"])])
 def test_tables_are_read_and_the_line_of_an_error_is_named(tmp_path, seed, blank):
     rng = np.random.default_rng(seed)
     n_rows, n = int(rng.integers(1, 30)), int(rng.integers(1, 5))
@@ -256,7 +255,7 @@ def test_fields_that_are_no_numbers_are_refused(tmp_path, wrong):
 # -- names ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_names_that_come_again_get_the_next_free_number(seed):
     rng = np.random.default_rng(seed)
     names = [

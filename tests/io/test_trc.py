@@ -139,17 +139,6 @@ def test_markers_are_kept_if_all_are_at_the_origin(tmp_path):
     assert (read(tmp_path, trc(np.zeros((9, 1, 3)), ["a"])) == 0).all(axis=None)
 
 
-@pytest.mark.parametrize("rate", [23.976, 25, 30, 59.94, 60, 120, 250, 1000])
-@pytest.mark.parametrize("digits", [3, 6])
-def test_times_with_few_digits_give_the_frame_rate(tmp_path, rate, digits):
-    times = 417 + np.arange(40) / rate
-    df = read(tmp_path, trc(tracks(), NAMES, rate, times, digits=digits))
-    assert df.attrs["frame_rate"] == pytest.approx(rate, abs=0.005)
-    assert df.attrs["first_time"] == 417
-    unsaid = trc(tracks(), NAMES, rate, times, digits=digits).replace("DataRate\tC", "Rate\tC")
-    assert read(tmp_path, unsaid).attrs["frame_rate"] == pytest.approx(rate, rel=0.002)
-
-
 @pytest.mark.parametrize(("off", "even"), [(0.002, True), (0.003, False)])
 def test_even_times_miss_their_places_by_a_tenth_of_a_step_and_half_a_digit(tmp_path, off, even):
     """0.0025 s in steps of 0.02 s with three digits, where no rate is stated."""
@@ -160,22 +149,6 @@ def test_even_times_miss_their_places_by_a_tenth_of_a_step_and_half_a_digit(tmp_
     else:
         with pytest.warns(UserWarning, match="its times are uneven"):
             assert read(tmp_path, text).attrs["frame_rate"] is None
-
-
-def test_equal_times_have_the_stated_rate_or_none(tmp_path):
-    text = trc(tracks(), NAMES, times=np.zeros(40))
-    facts = read(tmp_path, text).attrs
-    assert facts["frame_rate"] == 50
-    assert "times" not in facts
-    with pytest.warns(UserWarning, match="in steps of 0 to 0 s"):
-        facts = read(tmp_path, text.replace("DataRate\tC", "Rate\tC")).attrs
-    assert facts["frame_rate"] is None
-
-
-@pytest.mark.parametrize("n_frames", [3, 5, 12])
-def test_stated_rate_is_used_where_digits_are_few(tmp_path, n_frames):
-    df = read(tmp_path, trc(tracks()[:n_frames], NAMES, 30, digits=2))
-    assert df.attrs["frame_rate"] == 30
 
 
 def test_rate_of_data_is_used_not_that_of_cameras(tmp_path):
@@ -200,10 +173,6 @@ def test_lost_frames_are_uneven_times(tmp_path):
     np.testing.assert_allclose(df.attrs["times"], times)
     for rate in (50, 0.5):
         assert read(tmp_path, text, frame_rate=rate).attrs["frame_rate"] == rate
-
-
-def test_single_frame_has_the_stated_rate(tmp_path):
-    assert read(tmp_path, trc(tracks(1), NAMES)).attrs["frame_rate"] == 50
 
 
 @pytest.mark.parametrize(

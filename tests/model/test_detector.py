@@ -21,7 +21,7 @@ from sklearn_motionsync import (
 from sklearn_motionsync.body.mirror import exchange_of_sides
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import SpreadScorer
-from sklearn_motionsync.model.acceptance import Contrast, LogPredictionInterval
+from sklearn_motionsync.model.acceptance import Contrast
 from sklearn_motionsync.model.similarity import movement_energies
 
 TESTS = ["movement", "course", "duration", "energy"]
@@ -189,26 +189,6 @@ def test_duration_false_accepts_any_duration(detector):
     assert blind.predict([wave(), wave(120), wave(30)]).tolist() == [1, 1, 1]
     assert blind.predict([wave(120, size=0.4)]).tolist() == [-1]
     assert "duration" not in blind.borders_
-
-
-def test_groups_that_differ_widen_the_interval():
-    rng = np.random.default_rng(0)
-    groups = np.arange(24) // 6
-    values = np.exp(np.repeat([-0.4, -0.1, 0.2, 0.3], 6) + 0.01 * rng.standard_normal(24))
-    apart, together = (LogPredictionInterval(values, g, 0.95) for g in (groups, np.arange(24)))
-    assert apart.upper / apart.lower > 1.3 * together.upper / together.lower
-    np.testing.assert_allclose(apart.standardize([apart.lower, apart.upper]), [-1, 1])
-
-
-@pytest.mark.parametrize("coverage", [0.8, 0.95])
-def test_prediction_interval_has_its_nominal_coverage(coverage):
-    rng = np.random.default_rng(0)
-    held = []
-    for _ in range(300):
-        logs = np.sqrt(0.07) * rng.standard_normal(120)
-        interval = LogPredictionInterval(np.exp(logs[:20]), np.arange(20), coverage)
-        held.append(np.mean(np.abs(interval.standardize(np.exp(logs[20:]))) <= 1))
-    assert abs(np.mean(held) - coverage) < 0.01
 
 
 # -- real people ------------------------------------------------------------------------

@@ -15,7 +15,6 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     find_departures,
-    to_frame,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.filters import smooth
@@ -145,7 +144,7 @@ def test_predictive_variance_leaves_groups_out_value_by_value(people):
 def test_simultaneous_bands_hold_what_is_seen_of_new_people():
     """About as many of the performances of new people as without gaps."""
     held = {"whole": [], "gaps": []}
-    for seed in range(60):
+    for seed in range(20):
         X = performances(11, seed=seed)
         for name, some in (("whole", X), ("gaps", hide(X, seed=seed))):
             known, new = some[:10], some[10:]
@@ -209,7 +208,7 @@ def test_dissimilarity_compares_what_was_seen_of_both(gaps):
 def test_gaps_neither_accept_nor_reject():
     """Of new people, as many are accepted with gaps; what is another movement stays refused."""
     accepted = {"whole": [], "gaps": [], "backwards": [], "still": []}
-    for seed in range(20):
+    for seed in range(6):
         X = performances(30, seed=seed)
         model = ActionModel(coverage=0.9).fit(hide(X[:10], seed=seed))
         new = X[10:]
@@ -263,19 +262,6 @@ def test_portions_give_the_same_to_the_last_bit(gaps):
     for name in ("mean_", "variance_", "predictive_variance_", "missing_", "deviations_"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
     np.testing.assert_allclose(parts.threshold_, whole.threshold_, rtol=1e-12)
-
-
-def test_every_kind_of_collection_gives_equal_results(gaps):
-    expected = ActionModel().fit(gaps).score_samples(gaps)
-    objects = np.empty(len(gaps), dtype=object)
-    objects[:] = list(gaps)
-    table = to_frame(list(gaps), columns=list("abc"))
-    for given in (list(gaps), objects, [x.tolist() for x in gaps], table):
-        np.testing.assert_array_equal(ActionModel().fit(given).score_samples(given), expected)
-    rows = gaps[:, :, 0]
-    model = ActionModel().fit(rows)
-    assert np.isfinite(model.score_samples(rows)).all()
-    assert model.sample(2, random_state=0).shape == (2, P)
 
 
 def test_a_search_in_a_pipeline_of_one_step(gaps):

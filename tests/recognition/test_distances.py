@@ -106,8 +106,7 @@ PARTS = slice(0, 5), slice(5, 13)
 
 @pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("n_features", [1, 3, 41])
-@pytest.mark.parametrize("n_frames", [2, 17, 33])
+@pytest.mark.parametrize(("n_features", "n_frames"), [(3, 2), (41, 17), (1, 33)])
 def test_blocks_of_any_shape_have_the_same_bits(cost, dtype, n_features, n_frames):
     settings = {"velocity_smoothing": 0.06, "max_offset": 0.4, "smoothness": 0.003, "max_rate": 4}
     comparison = PairwiseDistance(cost, normalize=True, n_frames=n_frames, dtype=dtype, **settings)
@@ -122,8 +121,8 @@ def test_blocks_of_any_shape_have_the_same_bits(cost, dtype, n_features, n_frame
         np.testing.assert_array_equal(found, D)
 
 
-@pytest.mark.parametrize("n_bases", [1, 2, 15, 16, 17, 100, 1000])
-@pytest.mark.parametrize("n_moving", [1, 3, 16, 300])
+@pytest.mark.parametrize("n_bases", [1, 16, 17, 1000])
+@pytest.mark.parametrize("n_moving", [1, 3, 300])
 def test_blocks_hold_every_pair_once_and_nothing_else(n_bases, n_moving):
     counts = np.zeros((n_bases, n_moving), dtype=int)
     blocks = blocks_of_pairs(n_bases, n_moving)

@@ -87,7 +87,7 @@ def test_rejected_performances_never_have_a_class(name):
         assert len(dtypes) <= 1
 
 
-@pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.parametrize("name", ["int8", "bool", "object", "datetime64[D]"])
 def test_unknown_label_of_another_kind_is_refused(name):
     pair, kind = PAIRS[name]
     classifier, _ = fit(pair)
