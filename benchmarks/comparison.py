@@ -1,36 +1,52 @@
-"""Whether `compare_groups` keeps its level, and what it finds, on made gait with known differences.
+"""Whether `compare_groups` keeps its level, and what it finds, beside other tests of curves.
 
-    python benchmarks/comparison.py [N_STUDIES [N_JOBS]]
-    python benchmarks/comparison.py level [N_STUDIES [N_JOBS [FOLDER]]]
+    pip install spm1d fdasrsf fdatools
+    python benchmarks/comparison.py DATA_FOLDER [studies] [level] [peers] [nlreg1d] [--studies N]
 
-Studies of `make_gait` with two strides a person, all four signals. In null studies nothing differs;
-groups, pairs, or a covariate are drawn at random. Signals are scaled for the match and compared in
-their units, by 399 permutations at 5 %. *Level* has null studies alone, 1000 by default: of 8 to 30
-people, one to four signals, and templates of group A alone; and of people drawn from the forces of
-a muscle in FOLDER, ../shared/data/nlreg1d, in groups at random. By 199 permutations.
+*Studies* of `make_gait` with 10 or 20 people of two strides, all four signals, and differences that
+it makes. In null studies nothing differs; groups, pairs, or a covariate are drawn at random.
+Signals are scaled for the match and compared in their units, by 399 permutations at 5 %. *Level*
+has null studies alone: of 8 to 30 people, one to four signals, and templates of group A alone; and
+of people drawn from the forces of a muscle (nlreg1d), in groups at random. By 199 permutations.
+*Called* is what the clusters say, if shape and timing together differ. In per cent.
 
-Prints Markdown: per cent of the studies in which each answer is given. *Called* is what the
-clusters say, if shape and timing together differ.
+*Peers*: null strides of 20 people, and what is made on top of them for group B: a warp of at most 2
+or 3 % of the cycle, around 20 % (early) or 70 % (late); a bump of the knee of 5 or 10 degrees; or
+both. The signals are the knee alone, or all four. All tests have 5 %, and the means of people where
+they take one curve a person.
+
+- compare_groups: signals are scaled for the match, 999 permutations.
+- spm1d: after linear normalisation, t of one signal. Of four, Hotelling's T2 of the angles and t of
+  the force at 2.5 % each, because T2 does not exist where the force is 0.
+- nlreg1d: its procedure, with fdasrsf and spm1d. Curves are registered by square-root slopes; T2 of
+  registered curve and displacement; if it rejects, t of each at 2.5 %. By random field theory. Each
+  of several signals is tested alone, with Bonferroni's correction.
+- fdatools: its t test by 999 permutations after linear normalisation; *registered*: after its
+  registration of all signals by least squares, of curves and of warps at half of the level each.
+  Each of several signals alone, with Bonferroni's correction.
+
+*Right*: of the studies in which a difference is found, those in which shape is called if and only
+if it differs, and timing likewise. *Overlap*: intersection over union of the frames that are found,
+in any signal, with those in which the true difference is above a quarter of its largest value; the
+median where it is found. *Nlreg1d*: answers to its data sets (github.com/0todd0000/nlreg1d, folder
+Data), beside those that it published. Prints Markdown.
 """
 
-import os
-import sys
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
+import contextlib
+import io
+import time
 import warnings
-from pathlib import Path
+from functools import partial
 
 import numpy as np
+from harness import command_line, percent, print_head, print_row, run_tables
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import DenseSynchronizer, FrameWise, compare_groups
 from sklearn_motionsync.datasets import make_gait
 
-P, PERMUTATIONS, LEVEL = 101, 399, 0.05
-PEOPLE = (10, 20)
+P, KNEE, LEVEL, PERMUTATIONS = 101, 1, 0.05, 999
 # What differs, and what is compared.
 STUDIES = {
     "nothing, two groups": ({}, "two"),
@@ -67,14 +83,15 @@ def compared(gait, kind, rng):
     return {"covariate": [of[person] for person in gait.person]}
 
 
-def study(seed, n_people, params, kind):
+def gait_study(seed, n_people, params, kind):
     """Whether each answer is given, of one study."""
     warnings.simplefilter("ignore")
     gait = make_gait(n_people, 2, random_state=seed, **params)
     pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(gait.data)
-    given = compared(gait, kind, np.random.default_rng(seed))
-    given |= {"people": gait.person, "n_permutations": PERMUTATIONS}
-    found = compare_groups(pipe, gait.data, **given, random_state=seed)
+    design = compared(gait, kind, np.random.default_rng(seed))
+    found = compare_groups(
+        pipe, gait.data, **design, people=gait.person, n_permutations=399, random_state=seed
+    )
     differs = found.to_frame()["differs"].tolist()
     called = set(found.clusters["what"]) if differs[0] else set()
     return [*differs, "shape" in called, "timing" in called]
@@ -92,9 +109,9 @@ def null_study(seed):
     one.fit([x for x, group in zip(data, gait.group, strict=True) if group == "A"])
     rows = []
     for kind in ("two", "three", "paired", "covariate", "within", "template of A"):
-        given = compared(gait, "two" if kind == "template of A" else kind, rng)
-        given |= {"people": gait.person, "n_permutations": 199, "random_state": seed}
-        found = compare_groups(one if kind == "template of A" else pipe, data, **given)
+        design = compared(gait, "two" if kind == "template of A" else kind, rng)
+        design |= {"people": gait.person, "n_permutations": 199, "random_state": seed}
+        found = compare_groups(one if kind == "template of A" else pipe, data, **design)
         rows.append(found.to_frame()["differs"].tolist())
     return rows
 
@@ -107,47 +124,332 @@ def null_study_of_forces(seed, curves):
     X = list(curves[rng.permutation(len(curves))[:n], :, np.newaxis])
     sync, rows = DenseSynchronizer(P).fit(X), []
     three, age = (np.arange(n) % 3).tolist(), rng.normal(size=n)
-    for given in ({"groups": ["A", "B"] * (n // 2)}, {"groups": three}, {"covariate": age}):
-        found = compare_groups(sync, X, **given, n_permutations=199, random_state=seed)
+    for design in ({"groups": ["A", "B"] * (n // 2)}, {"groups": three}, {"covariate": age}):
+        found = compare_groups(sync, X, **design, n_permutations=199, random_state=seed)
         rows.append(found.to_frame()["differs"].tolist())
     return rows
 
 
-def levels(n_studies, n_jobs, folder=None):
-    """Print how often each answer is given where nothing differs."""
+# -- beside others ----------------------------------------------------------------------
+
+CLOCK = np.linspace(0, 1, P)
+SETTINGS = {"knee": [KNEE], "four signals": [0, 1, 2, 3]}
+AT = {"early": 0.2, "late": 0.7}
+# Largest warp in per cent of the cycle, height of the bump in degrees, and where.
+DIFFERENCES = {"nothing": (0, 0, 0.2)}
+for _at, _centre in AT.items():
+    DIFFERENCES |= {f"timing {w} % {_at}": (w, 0, _centre) for w in (2, 3)}
+    DIFFERENCES |= {f"shape {h} degrees {_at}": (0, h, _centre) for h in (5, 10)}
+    DIFFERENCES[f"both 3 % and 10 degrees {_at}"] = (3, 10, _centre)
+
+
+# -- the made data ------------------------------------------------------------------------
+
+
+def later(t, largest, centre):
+    """How much later group B is at moments t, as a share of the cycle; smooth, 0 far away."""
+    width = min(centre, 1 - centre)
+    return largest / 100 * np.cos(np.pi / 2 * np.clip((t - centre) / width, -1, 1)) ** 2
+
+
+def bump(t, height, centre):
+    return height * np.exp(-(((t - centre) / 0.06) ** 2) / 2)
+
+
+def made(seed, n_people, difference):
+    """Trials, groups, people; and the frames in which shape and timing truly differ, or None."""
+    warp, height, centre = DIFFERENCES[difference]
+    gait = make_gait(n_people, 2, random_state=seed)
+    trials = []
+    for x, group in zip(gait.data, gait.group, strict=True):
+        if group == "B":
+            t = np.linspace(0, 1, len(x))
+            x = x + bump(t, height, centre)[:, np.newaxis] * (np.arange(x.shape[1]) == KNEE)
+            moments = t - later(t, warp, centre)  # what is shown at t was before shown then
+            x = np.stack([np.interp(moments, t, column) for column in x.T], axis=1)
+        trials.append(x)
+    truth = {"shape": None, "timing": None}
+    if height:
+        truth["shape"] = bump(CLOCK, height, centre) > height / 4
+    if warp:
+        truth["timing"] = later(CLOCK, warp, centre) > warp / 400
+    return trials, list(gait.group), list(gait.person), truth
+
+
+def means_of_people(trials, groups, people):
+    """Means of linearly normalised trials, group A first: (n_people, P, n_signals), and n of A."""
+    curves = np.stack([
+        np.stack([np.interp(CLOCK, np.linspace(0, 1, len(x)), column) for column in x.T], axis=1)
+        for x in trials
+    ])  # fmt: skip
+    of = dict(zip(people, groups, strict=True))
+    names = sorted(of, key=lambda name: of[name])
+    means = [curves[[person == name for person in people]].mean(axis=0) for name in names]
+    return np.stack(means), sum(of[name] == "A" for name in names)
+
+
+# -- the tests ----------------------------------------------------------------------------
+# Each takes trials, groups and people, and gives joint, shape and timing (None if it does not
+# tell them apart), and masks of the frames found, (P,), or None.
+
+
+def answer(joint, shape=None, timing=None):
+    """From masks, answers, or None."""
+    masks = [mask if isinstance(mask, np.ndarray) else None for mask in (shape, timing)]
+    calls = [None if call is None else bool(np.any(call)) for call in (shape, timing)]
+    return dict(zip(("joint", "shape", "timing", "shape_mask", "timing_mask"),
+                    (bool(joint), *calls, *masks), strict=True))  # fmt: skip
+
+
+def ours(trials, groups, people):
+    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(trials)
+    found = compare_groups(pipe, trials, groups, people=people, n_permutations=PERMUTATIONS)
+    masks = {what: np.zeros(P, dtype=bool) for what in ("shape", "timing")}
+    if found.p_joint <= LEVEL:
+        for row in found.clusters.itertuples():
+            masks[row.what][round(row.start) : round(row.end) + 1] = True
+    return answer(found.p_joint <= LEVEL, **masks)
+
+
+def varying(y, n):
+    """Frames in which curves (n_people, P) vary in both groups: the force is 0 in swing."""
+    spread = np.minimum(y[:n].std(axis=0), y[n:].std(axis=0))
+    return spread > 1e-6 * spread.max()
+
+
+def spm1d_t(y, n, level):
+    import spm1d
+
+    kept = varying(y, n)
+    return spm1d.stats.ttest2(y[:n, kept], y[n:, kept]).inference(level, two_tailed=True).h0reject
+
+
+def spm1d_linear(trials, groups, people):
+    import spm1d
+
+    y, n = means_of_people(trials, groups, people)
+    if y.shape[2] == 1:
+        return answer(spm1d_t(y[:, :, 0], n, LEVEL))
+    a, b = y[:n, :, :3], y[n:, :, :3]
+    angles = spm1d.stats.hotellings2(a, b).inference(LEVEL / 2).h0reject
+    return answer(angles or spm1d_t(y[:, :, 3], n, LEVEL / 2))
+
+
+def srsf(y):
+    """Registered curves and displacements, (n, P) both, without the first and last frame."""
+    import fdasrsf
+
+    clock = np.linspace(0, 1, y.shape[1])
+    with contextlib.redirect_stdout(io.StringIO()):
+        registration = fdasrsf.fdawarp(y.T, clock)
+        registration.srsf_align(MaxItr=5, verbose=False)
+    # A frame of the template is at gam(t) of the curve. The displacement tells, at the frames of
+    # the curve, how much later they are than in the template.
+    displacement = np.stack([clock - np.interp(clock, g, clock) for g in registration.gam.T])
+    return registration.fn.T[:, 1:-1], displacement[:, 1:-1]
+
+
+def joined(answers):
+    """Of several signals: rejects, and frames of shape and timing in any."""
+    rejects, shape, timing = zip(*answers, strict=True)
+    return answer(any(rejects), np.any(shape, axis=0), np.any(timing, axis=0))
+
+
+def nlreg1d(trials, groups, people):
+    y, n = means_of_people(trials, groups, people)
+    return joined([nlreg1d_test(*srsf(x), n, LEVEL / y.shape[2]) for x in np.moveaxis(y, 2, 0)])
+
+
+def nlreg1d_test(curves, displacement, n, level, paired=False):
+    """By random field theory: whether T2 rejects, and the frames that post hoc t rejects."""
+    import spm1d
+
+    masks, fields = np.zeros((2, curves.shape[1] + 2), dtype=bool), (curves, displacement)
+    kept = varying(curves, n) & varying(displacement, n)
+    both = np.stack(fields, axis=2)[:, kept]
+    if paired:
+        t2, t = spm1d.stats.hotellings_paired, spm1d.stats.ttest_paired
+    else:
+        t2, t = spm1d.stats.hotellings2, spm1d.stats.ttest2
+    rejects = t2(both[n:], both[:n]).inference(level).h0reject
+    if rejects:
+        for mask, field in zip(masks, fields, strict=True):
+            kept = varying(field, n)
+            found = t(field[n:, kept], field[:n, kept]).inference(level / 2, two_tailed=True)
+            mask[1 + np.flatnonzero(kept)] = np.abs(found.z) > found.zstar
+    return rejects, *masks
+
+
+def fdatools_p(y, n):
+    """p of curves (n, P)."""
+    import fdatools
+
+    basis = fdatools.BSpline((0.0, 1.0), 30)
+    fds = [fdatools.smooth(x.T, CLOCK, basis=basis, lam=1e-8).fd for x in (y[:n], y[n:])]
+    return fdatools.stats.t_test(*fds, n_perm=PERMUTATIONS, random_state=0).pvalue
+
+
+def fdatools_linear(trials, groups, people):
+    y, n = means_of_people(trials, groups, people)
+    return answer(min(fdatools_p(x, n) for x in np.moveaxis(y, 2, 0)) <= LEVEL / y.shape[2])
+
+
+def fdatools_registered(trials, groups, people):
+    import fdatools
+
+    y, n = means_of_people(trials, groups, people)
+    scaled = (y - y.mean(axis=(0, 1))) / y.std(axis=(0, 1))
+    basis, warps = fdatools.BSpline((0.0, 1.0), 30), fdatools.BSpline((0.0, 1.0), 8)
+    fds = [fdatools.smooth(x.T, CLOCK, basis=basis, lam=1e-8).fd for x in np.moveaxis(scaled, 2, 0)]
+    coefs = fds[0].coefs if len(fds) == 1 else np.stack([fd.coefs for fd in fds], axis=2)
+    options = {"criterion": "least_squares", "warp_basis": warps, "lam": 1e-4}
+    result = fdatools.register(fdatools.FData(coefs, basis), max_iter=30, tol=1e-6, **options)
+    # A frame of the template is at warp(t) of the curve.
+    moments = np.asarray(result.warp_values(CLOCK)).T
+    curves = [
+        np.stack([np.interp(at, CLOCK, x) for at, x in zip(moments, own, strict=True)])
+        for own in np.moveaxis(y, 2, 0)
+    ]
+    shape = min(fdatools_p(x, n) for x in curves) <= LEVEL / 2 / len(curves)
+    timing = fdatools_p(moments - CLOCK, n) <= LEVEL / 2
+    return answer(shape or timing, shape, timing)
+
+
+TESTS = {
+    "compare_groups": ours,
+    "spm1d": spm1d_linear,
+    "nlreg1d": nlreg1d,
+    "fdatools": fdatools_linear,
+    "fdatools, registered": fdatools_registered,
+}
+
+
+# -- studies ------------------------------------------------------------------------------
+
+
+def peer_study(seed, difference, signals, name):
+    """The answer of a test, with seconds, whether it is right, and overlaps."""
+    trials, groups, people, truth = made(seed, 20, difference)
+    begin = time.perf_counter()
+    row = TESTS[name]([x[:, signals] for x in trials], groups, people)
+    row["seconds"] = time.perf_counter() - begin
+    if row["joint"] and row["shape"] is not None:
+        row["right"] = all(row[what] == (truth[what] is not None) for what in truth)
+    for what, mask in truth.items():
+        found = row[f"{what}_mask"]
+        if mask is not None and found is not None and found.any():
+            row[f"{what} overlap"] = (found & mask).sum() / (found | mask).sum()
+    return row
+
+
+# -- tables -----------------------------------------------------------------------------
+
+
+def share_table(corner, rows, work):
+    """Per cent of the studies in which each answer is given, a row each."""
+    print_head(corner, ANSWERS)
+    for name, function in rows.items():
+        answers = Parallel(2)(delayed(function)(seed) for seed in work)
+        shares = 100 * np.mean(answers, axis=0)
+        print_row(name, [f"{x:.1f}" for x in shares])
+
+
+def study_table(folder, n_studies=300):
+    for n_people in (10, 20):
+        rows = {
+            name: partial(gait_study, n_people=n_people, params=params, kind=kind)
+            for name, (params, kind) in STUDIES.items()
+        }
+        share_table(f"{n_people} people, differs by", rows, range(n_studies))
+
+
+def level_table(folder, n_studies=1000):
+    """How often each answer is given where nothing differs."""
     kinds = ["two groups", "three groups", "paired", "covariate", "covariate within people"]
     kinds.append("two groups, template of A alone")
-    found = Parallel(n_jobs)(delayed(null_study)(seed) for seed in range(n_studies))
-    rows = dict(zip(kinds, 100 * np.mean(found, axis=0), strict=True))
-    if folder is not None:
-        table = np.loadtxt(Path(folder) / "Besier2009-vastus.csv", delimiter=",")
-        work = (delayed(null_study_of_forces)(seed, table[:, 1:]) for seed in range(n_studies))
-        shares = 100 * np.mean(Parallel(n_jobs)(work), axis=0)
-        names = [f"forces, {kind}" for kind in ("two groups", "three groups", "covariate")]
-        rows |= dict(zip(names, shares, strict=True))
-    print(f"\n| nothing differs, {n_studies} studies | " + " | ".join(ANSWERS[:4]) + " |")
-    print("|---" * 5 + "|")
-    for name, shares in rows.items():
-        print(f"| {name} | " + " | ".join(f"{x:.1f}" for x in shares) + " |", flush=True)
+    table = np.loadtxt(folder / "nlreg1d" / "Besier2009-vastus.csv", delimiter=",")
+    print_head(f"nothing differs, {n_studies} studies", ANSWERS[:4])
+    for prefix, names, function in (
+        ("", kinds, null_study),
+        ("forces, ", kinds[:2] + kinds[3:4], partial(null_study_of_forces, curves=table[:, 1:])),
+    ):
+        answers = Parallel(2)(delayed(function)(seed) for seed in range(n_studies))
+        for name, shares in zip(names, 100 * np.mean(answers, axis=0), strict=True):
+            print_row(prefix + name, [f"{x:.1f}" for x in shares])
 
 
-def main():
-    if sys.argv[1:2] == ["level"]:
-        given = [1000, 2, None]
-        given[: len(sys.argv) - 2] = sys.argv[2:]
-        levels(int(given[0]), int(given[1]), given[2])
-        return
-    n_studies = int(sys.argv[1]) if len(sys.argv) > 1 else 400
-    n_jobs = int(sys.argv[2]) if len(sys.argv) > 2 else 2
-    for n_people in PEOPLE:
-        print(f"\n| {n_people} people, differs by | " + " | ".join(ANSWERS) + " |")
-        print("|---" * (1 + len(ANSWERS)) + "|")
-        for name, (params, kind) in STUDIES.items():
-            n = n_studies if not params else n_studies // 2
-            work = (delayed(study)(seed, n_people, params, kind) for seed in range(n))
-            shares = 100 * np.mean(Parallel(n_jobs)(work), axis=0)
-            print(f"| {name} | " + " | ".join(f"{x:.1f}" for x in shares) + " |", flush=True)
+def peer_table(folder, n_studies=30):
+    columns = ["joint", "shape", "timing", "right", "overlap: shape", "timing", "seconds"]
+    for setting, signals in SETTINGS.items():
+        for difference in DIFFERENCES:
+            print_head(f"{setting}, {difference}", columns)
+            for name in TESTS:
+                found = [peer_study(seed, difference, signals, name) for seed in range(n_studies)]
+                print_row(name, cells_of(found))
+
+
+def cells_of(found):
+    """Of the studies of one test."""
+    cells = []
+    for key in ("joint", "shape", "timing", "right"):
+        values = [row[key] for row in found if row.get(key) is not None]
+        cells.append(percent(np.mean(values)) if values else "-")
+    for key in ("shape overlap", "timing overlap", "seconds"):
+        values = [row[key] for row in found if key in row]
+        cells.append(f"{np.median(values):.2f}" if values else "-")
+    return cells
+
+
+# -- the data sets of nlreg1d --------------------------------------------------------------
+
+# What the figures of its repository say, by 1000 permutations; in per cent.
+PUBLISHED = {
+    "SimulatedA": "shape 35-62; not timing; not linear",
+    "SimulatedB": "timing 32-63; not shape; linear 32-48",
+    "Besier2009-vastus": "timing 15-30; not shape; not linear",
+    "Pataky2014-mediolateral": "timing 54-89, 16-20; not shape; linear 65-82",
+}
+
+
+def stretches(mask):
+    """Of frames, in per cent, as text."""
+    edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(int), 0])).reshape(-1, 2)
+    scale = 100 / (len(mask) - 1)
+    return ", ".join(f"{scale * a:.0f}-{scale * (b - 1):.0f}" for a, b in edges) or "not"
+
+
+def nlreg1d_table(folder):
+    """Answers to each set, beside the published ones."""
+    print_head("set", ["published", "nlreg1d, with fdasrsf of today", "compare_groups"])
+    for path in sorted((folder / "nlreg1d").glob("*.csv")):
+        table = np.loadtxt(path, delimiter=",")
+        table = table[np.argsort(table[:, 0], kind="stable")]
+        groups, curves = table[:, 0].astype(int).tolist(), table[:, 1:]
+        n, X = groups.count(0), list(curves[:, :, np.newaxis])
+        paired = path.stem.startswith("Pataky")
+        rejects, shape, timing = nlreg1d_test(*srsf(curves), n, LEVEL, paired=paired)
+        words = f"shape {stretches(shape)}; timing {stretches(timing)}" if rejects else "nothing"
+        people = {"people": [*range(n)] * 2, "paired": True} if paired else {}
+        found = compare_groups(DenseSynchronizer(P).fit(X), X, groups, **people)
+        print_row(path.stem, [PUBLISHED.get(path.stem, "nothing"), words, found.describe()])
+
+
+TABLES = {
+    "studies": study_table,
+    "level": level_table,
+    "peers": peer_table,
+    "nlreg1d": nlreg1d_table,
+}
+
+
+def with_studies(options):
+    """Have the first three tables make so many studies."""
+    for name in [*TABLES][:3] if options.studies else ():
+        TABLES[name] = partial(TABLES[name], n_studies=options.studies)
 
 
 if __name__ == "__main__":
-    main()
+    warnings.simplefilter("ignore")
+    command = command_line(__doc__)
+    command.add_argument("--studies", type=int, help="how many of a row")
+    run_tables(TABLES, command, with_studies)

@@ -1,203 +1,213 @@
-"""Hidden limbs of real people: `MotionTracker` beside filters and smoothers that know less or more.
+"""Hidden joints of people who were left out: `MotionTracker` beside a filter without a phase.
 
-    python benchmarks/tracking.py DATA_FOLDER [--actions ...] [--seeds 10] [--takes 2]
+    python benchmarks/tracking.py DATA_FOLDER [hdm05] [utkinect]
 
-HDM05, postures of 37 numbers at 30 frames a second, noise of 0.05 on what is seen. Each actor is
-held out in turn, and everything is learnt from the others. Hidden is *half*: 6 limbs of 12 drawn at
-random, all the time; *gap*: everything for a second, a third of the take where that is shorter;
-*halfgap*: 6 limbs for as long. A gap lies anywhere but at the ends. A seed draws two takes of
-each actor, noise, what is hidden, and the particles. Settings of peers are chosen on training
-people who are left out for that.
+*hdm05* are six actions at 30 frames a second, each actor held out in turn; *utkinect* ten actions
+of a Kinect, two of ten actors held out. Joints are moved by 1 cm in every coordinate, and some are
+hidden: *arm*, an elbow and its wrist; *legs*, knees and ankles; *gap*, all for 20 frames, half of
+the take where that is shorter. *moved*: all are seen, and moved by 5 cm. Two takes of each actor.
 
-1. Degrees between true and estimated direction of hidden limbs, mean over hidden frames and limbs
-   of a take, then over takes; mean and standard deviation over seeds. Filters and smoothers apart.
-   *Known phase* is given the path of the whole clean clip, which no filter can know: the ceiling.
-2. The tracker's phase: |phase - that path| in frames of 100, after the first fifth.
-3. Bands of filters: hidden cosines within the mean and 1.645 standard deviations, of 90 % meant.
-4. Frames that the tracker calls lost: of right takes, and of what is none of the action.
-5. Its errors to those it is held against, mean over actions and kinds of hiding.
-6. Speed, in frames a second of processor time (one thread), with 500 particles.
+The peer is a Kalman filter and smoother of a Matern-3/2 process about the mean posture of the
+training people, which knows no phase. It is told the covariance of the noise, simulated on training
+people, and has the best of its settings for each column, chosen by the result. The tracker has
+`JointNoise`. Mean error of the joints that are hidden (or moved), over takes, then over actions;
+the share of hidden cosines within bands of 90 %; and frames called lost, of right takes and of
+other actions under the same model. Prints Markdown.
 """
 
-import argparse
-import time
-from collections import defaultdict
+import functools
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
-import trackers
-from hidden_limbs import KINDS, N_LIMBS, NOISE, RATE, SMOOTHER, TRACKER, Fold, angles, examine, read
-from threadpoolctl import threadpool_limits
+from harness import P, command_line, percent, print_head, print_row, read_archive, run_tables
+from scipy.linalg import cho_factor, cho_solve
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, JointNoise, MotionTracker
 
-# Named before any result was looked at; --actions takes the other two, which are cyclic.
-ACTIONS = ("depositFloorR", "elbowToKnee1RepsLelbowStart", "grabHighR", "hopBothLegs1hops")
-# Ratios of errors, and what they are to be at most.
-BARS = (
-    (TRACKER, "pooled Matern", 1.0),
-    (TRACKER, "VAR(2)", 0.9),
-    (TRACKER + SMOOTHER, "constant velocity" + SMOOTHER, 0.9),
-)
+KINDS = ("arm", "legs", "gap", "moved")
+SMALL, LARGE, GAP, TAKES = 0.01, 0.05, 20, 2
+STEP = {"hdm05": 4, "utkinect": 1}
+# What keeps covariances of features that never move invertible: a twentieth of a degree.
+LEAST = 1e-6
+# Length scales of the peer, in frames, and shares by which its covariance is drawn to its diagonal.
+SETTINGS = list(product((5, 12, 27), (0.1, 0.5)))
 
-
-class Report:
-    """What came out of an action: lists by row, kind of hiding and seed."""
-
-    def __init__(self):
-        self.errors, self.phases = defaultdict(list), defaultdict(list)
-        self.inside, self.lost = defaultdict(list), defaultdict(list)
-
-    def take_in(self, fold, tracker, some, seed, kind, rng):
-        """Some takes of an actor, with something hidden."""
-        truth = [fold.takes[i] for i in some]
-        seen, masks = examine(truth, [kind] * len(truth), rng)
-        tracks, smooth = tracker.track(seen), tracker.smooth(seen)
-        answers = list(fold.answers(some, seen, rng))
-        answers += [(TRACKER, *_parts(tracks)), (TRACKER + SMOOTHER, *_parts(smooth))]
-        for name, found, stds in answers:
-            self.errors[name, kind, seed] += map(angles, found, truth, masks)
-            if stds is not None:
-                near = [
-                    (np.abs(x - y) <= 1.645 * s)[m].mean()
-                    for x, y, s, m in zip(found, truth, stds, masks, strict=True)
-                ]
-                self.inside[name, kind] += near
-        self.look(fold, tracks, some, kind)
-
-    def take_whole(self, fold, tracker, some, rng):
-        """Some takes of an actor, nothing hidden."""
-        takes = trackers.noisy([fold.takes[i] for i in some], NOISE, rng)
-        self.look(fold, tracker.track(takes), some, "nothing")
-
-    def look(self, fold, tracks, some, kind):
-        for track, i in zip(tracks, some, strict=True):
-            path = fold.paths[i]
-            self.phases[kind] += np.abs(track.phases - path)[len(path) // 5 :].tolist()
-            self.lost[f"right takes, {kind} hidden"].append(track.lost.mean())
-
-    def take_wrong(self, fold, tracker, some, others, rng):
-        """What is none of the action, or stands still for two seconds."""
-        takes = [fold.takes[i] for i in some]
-        wrong = {"another action": others, "upside down": [upside_down(x) for x in takes]}
-        wrong["first posture, still"] = [np.tile(x[0], (2 * RATE, 1)) for x in takes]
-        wrong["half-way, still"] = [np.tile(x[len(x) // 2], (2 * RATE, 1)) for x in takes]
-        for name, given in wrong.items():
-            tracks = tracker.track(trackers.noisy(given, NOISE, rng))
-            self.lost[name] += [track.lost.mean() for track in tracks]
-
-    def means(self, name):
-        """Mean errors (n_seeds, n_kinds)."""
-        seeds = sorted({seed for _, _, seed in self.errors})
-        return np.array([[np.mean(self.errors[name, k, s]) for k in KINDS] for s in seeds])
-
-    def tell(self):
-        names = list(dict.fromkeys(name for name, _, _ in self.errors))
-        for smoothers in (False, True):
-            title = "smoothers" if smoothers else "filters"
-            print(f"   {title:32}" + "".join(f"{kind:>16}" for kind in KINDS))
-            for name in names:
-                if name.endswith(SMOOTHER) == smoothers:
-                    means = self.means(name)
-                    pairs = zip(means.mean(axis=0), means.std(axis=0), strict=True)
-                    print(f"   {name:32}" + "".join(f"   {m:5.2f} +- {s:4.2f}" for m, s in pairs))
-        for kind, found in self.phases.items():
-            median, most = np.quantile(found, [0.5, 0.9])
-            print(f"   phase, {kind} hidden: median {median:.2f}, 90 % {most:.1f} frames")
-        for name in names:
-            if (name, KINDS[0]) in self.inside:
-                cells = "".join(f"{100 * np.mean(self.inside[name, k]):5.0f}" for k in KINDS)
-                print(f"   % within the band, {name:30}{cells}")
-        for name, found in self.lost.items():
-            print(f"   called lost, {name}: {100 * np.mean(found):.0f} % of the frames", flush=True)
+# -- the peer ---------------------------------------------------------------------------
 
 
-def _parts(tracks):
-    stds = [np.sqrt(np.diagonal(t.covariances, axis1=1, axis2=2)) for t in tracks]
-    return [t.postures for t in tracks], stds
+class Linear(NamedTuple):
+    """``x' = transition x + N(0, drive)`` from N(0, spread); its first entries are seen."""
+
+    transition: np.ndarray
+    drive: np.ndarray
+    spread: np.ndarray
 
 
-def upside_down(x):
-    """Every limb points down where it pointed up."""
-    return x * np.concatenate([[1], np.tile([1, -1, 1], N_LIMBS)])
+def matern(takes, length, share):
+    """The mean posture of takes, and a Matern-3/2 process in time about it."""
+    frames = np.concatenate(takes)
+    rate, d = np.sqrt(3) / length, frames.shape[1]
+    C = np.cov(frames.T, bias=True) + LEAST * np.eye(d)
+    C = (1 - share) * C + share * np.diag(np.diag(C))
+    step = np.exp(-rate) * np.array([[1 + rate, 1], [-(rate**2), 1 - rate]])
+    rest = np.diag([1, rate**2])
+    drive = np.kron(rest - step @ rest @ step.T, C) + 1e-9 * np.eye(2 * d)
+    return frames.mean(axis=0), Linear(np.kron(step, np.eye(d)), drive, np.kron(rest, C))
 
 
-def run(action, others, seeds, n_takes):
-    """The report of an action, and the last fold; ``others``: takes of other actions by actor."""
-    report = Report()
-    for k, actor in enumerate(np.unique(action.actors)):
-        fold = Fold(action, actor)
-        print(f"   without {actor}, chosen: {fold.chosen}", flush=True)
-        for seed in range(seeds):
-            rng, tracker = np.random.default_rng([seed, k]), fold.tracker(seed)
-            some = np.sort(rng.permutation(len(fold.takes))[:n_takes])
-            for kind in KINDS:
-                report.take_in(fold, tracker, some, seed, kind, rng)
-            report.take_whole(fold, tracker, some, rng)
-            if seed == 0:
-                report.take_wrong(fold, tracker, some, others[actor], rng)
-    return report, fold
+def kalman(model, y, noise):
+    """Means of a take ``y`` (n_frames, d), NaN where hidden, live and smoothed by Rauch's pass.
+
+    ``noise`` is the covariance of what is seen.
+    """
+    F, d, before, after = model.transition, y.shape[1], [], []
+    x, C = np.zeros(len(model.spread)), model.spread
+    for t, row in enumerate(y):
+        if t:
+            x, C = F @ x, F @ C @ F.T + model.drive
+        before.append((x, C))
+        seen = np.flatnonzero(~np.isnan(row))
+        if len(seen):
+            S = C[np.ix_(seen, seen)] + noise[np.ix_(seen, seen)]
+            gain = cho_solve(cho_factor(S), C[seen])
+            x, C = x + (row[seen] - x[seen]) @ gain, C - C[:, seen] @ gain
+            C = (C + C.T) / 2
+        after.append((x, C))
+    smoothed = [after[-1][0]]
+    for (x, C), (ahead, spread) in zip(after[-2::-1], before[:0:-1], strict=True):
+        rest = cho_solve(cho_factor(spread), smoothed[-1] - ahead)
+        smoothed.append(x + C @ (F.T @ rest))
+    return np.array([x[:d] for x, _ in after]), np.array(smoothed[::-1])[:, :d]
 
 
-def show_ratios(reports):
-    """Mean over actions and kinds of the ratio of mean errors; over seeds, mean and spread."""
-    print(f"actions so far: {len(reports)}")
-    for name, to, most in BARS:
-        ratios = np.array([report.means(name) / report.means(to) for report in reports])
-        by_seed = ratios.mean(axis=(0, 2))
-        each = ", ".join(f"{x:.2f}" for x in ratios.mean(axis=(1, 2)))
-        found = f"{by_seed.mean():.3f} +- {by_seed.std():.3f}"
-        print(f"{name} to {to}: {found} (at most {most}; by action {each})")
-    for kind in ("nothing", "half"):
-        medians = np.mean([np.median(report.phases[kind]) for report in reports])
-        print(f"phase, {kind} hidden, mean of the medians of actions: {medians:.2f} (at most 4)")
+# -- people -----------------------------------------------------------------------------
 
 
-def show_speed(fold):
-    """Frames a second of processor time, on one thread, the best of three."""
-    x = trackers.noisy(fold.takes, NOISE, np.random.default_rng(0))
-    frames, tracker = sum(map(len, x)), fold.tracker(0)
+class Fold:
+    """An actor held out of an action, and what is learnt from the takes of the others."""
 
-    def one_by_one():
-        for take in x:
-            tracker.reset()
-            for frame in take:
-                tracker.step(frame)
+    def __init__(self, action, takes, actors, held, skeleton):
+        self.action, self.skeleton = action, skeleton
+        self.test = [x for x, a in zip(takes, actors, strict=True) if a == held][:TAKES]
+        self.train = [x for x, a in zip(takes, actors, strict=True) if a != held]
+        self.cosines = DirectionCosines(skeleton, hidden="nan").fit(self.train)
+        self.postures = self.cosines.transform(self.train)
+        self.groups = actors[actors != held]
+        columns = self.cosines.position_matrix()[1]
+        self.joints = [column[:-2] for column in columns[::3]]
+        self.trackers = {sd: self.tracker(sd) for sd in (SMALL, LARGE)}
+        self.covariances = {sd: self.covariance(sd) for sd in (SMALL, LARGE)}
 
-    works = {f"{TRACKER}.step": one_by_one}
-    works[f"{TRACKER}.track"] = lambda: tracker.track(x)
-    works[f"{TRACKER}.smooth"] = lambda: tracker.smooth(x)
-    for name, (peer, _) in fold.peers.items():
-        paths = fold.means if name.startswith("known") else None
-        works[name] = lambda p=peer, m=paths: p.run(x, NOISE, m, smooth=False)
-    for name, work in works.items():
-        times = []
-        for _ in range(3):
-            begun = time.process_time()
-            work()
-            times.append(time.process_time() - begun)
-        print(f"   {name:30} {frames / min(times):6.0f} frames a second")
+    def tracker(self, sd):
+        sync = DenseSynchronizer(P).fit(self.postures)
+        tracker = MotionTracker(sync, noise=JointNoise(sd, self.cosines), random_state=0)
+        return tracker.fit(self.postures, groups=self.groups)
+
+    def covariance(self, sd):
+        """Of the errors of cosines of training people whose joints are moved."""
+        rng = np.random.default_rng(1)
+        moved = [x + sd * rng.standard_normal(x.shape) for x in self.train]
+        off = np.concatenate(self.cosines.transform(moved)) - np.concatenate(self.postures)
+        return off.T @ off / len(off) + LEAST * np.eye(off.shape[1])
+
+    def case(self, x, kind, rng):
+        """What is seen of a take, and the joints that count (n_frames, n_joints)."""
+        moved = x + (LARGE if kind == "moved" else SMALL) * rng.standard_normal(x.shape)
+        counts = np.zeros((len(x), len(self.joints)), dtype=bool)
+        points, frames, hidden = moved.reshape(len(x), -1, 3), slice(None), []
+        if kind == "arm":
+            side = rng.choice(["left", "right"])
+            hidden = [f"{side}_elbow", f"{side}_wrist"]
+        elif kind == "legs":
+            hidden = [f"{s}_{joint}" for s in ("left", "right") for joint in ("knee", "ankle")]
+        elif kind == "gap":
+            length = min(GAP, len(x) // 2)
+            begin = rng.integers(1, len(x) - length)
+            frames, hidden = slice(begin, begin + length), self.joints
+            points[frames] = np.nan
+        for name in hidden:
+            points[frames, list(self.skeleton.indices_of(name))] = np.nan
+            counts[frames, self.joints.index(name)] = True
+        return self.cosines.transform([moved])[0], counts | (kind == "moved")
+
+    def place(self, postures, x):
+        """Joints (n_frames, n_joints, 3) of postures of a person with limbs of unit directions."""
+        lengths = DirectionCosines(self.skeleton).fit([x]).limb_lengths_
+        limbs = postures[:, 1:].reshape(len(postures), -1, 3)
+        limbs = limbs / np.linalg.norm(limbs, axis=2, keepdims=True)
+        whole = np.column_stack([postures[:, 0], limbs.reshape(len(limbs), -1)])
+        return (whole @ self.cosines.position_matrix(lengths)[0].T).reshape(len(whole), -1, 3)
+
+    def error(self, postures, x, counts):
+        """Of joints, in cm."""
+        truth = self.place(self.cosines.transform([x])[0], x)
+        return 100 * np.linalg.norm(self.place(postures, x) - truth, axis=2)[counts].mean()
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder")
-    parser.add_argument("--actions", nargs="*", default=ACTIONS)
-    parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument("--takes", type=int, default=2)
-    args = parser.parse_args()
-    names = dict.fromkeys([*args.actions, *ACTIONS])
-    actions, reports = {a.name: a for a in read(args.folder, names)}, []
-    for name in args.actions:
-        action, others = actions[name], defaultdict(list)
-        for other in actions.values():
-            for actor in np.unique(action.actors) if other is not action else ():
-                others[actor].append(other.takes[np.flatnonzero(other.actors == actor)[0]])
-        print(f"{name}: {len(action.takes)} takes of {len(np.unique(action.actors))} people")
-        report, fold = run(action, others, args.seeds, args.takes)
-        report.tell()
-        reports.append(report)
-        show_ratios(reports)
-    show_speed(fold)
+def folds_of(folder, archive):
+    """Every action with its actors held out in turn, or two of many."""
+    bunch = read_archive(folder, archive)
+    rng = np.random.default_rng(0)
+    for action in np.unique(bunch.target):
+        chosen = np.flatnonzero(bunch.target == action)
+        takes = [np.asarray(bunch.data[i], dtype=float)[:: STEP[archive]] for i in chosen]
+        actors = np.unique(bunch.actor[chosen])
+        for held in actors if len(actors) < 5 else rng.permutation(actors)[:2]:
+            yield Fold(action, takes, bunch.actor[chosen], held, bunch.skeleton)
+
+
+# -- the table --------------------------------------------------------------------------
+
+
+def table(archive, folder):
+    """Errors live / smoothed of ours and of the peer, bands, and frames called lost."""
+    folds, errors, bands, lost = list(folds_of(folder, archive)), {}, {}, {}
+    for k, fold in enumerate(folds):
+        models = {setting: matern(fold.postures, *setting) for setting in SETTINGS}
+        wrong = next(each for each in folds[k:] + folds[:k] if each.action != fold.action)
+        for i, (x, kind) in enumerate(product(fold.test, KINDS)):
+            sd = LARGE if kind == "moved" else SMALL
+            seen, counts = fold.case(x, kind, np.random.default_rng([k, i]))
+            tracker, truth = fold.trackers[sd], fold.cosines.transform([x])[0]
+            live = tracker.track(seen)
+            pair = live.postures, tracker.smooth(seen).postures
+            answers = {"`MotionTracker`": pair}
+            for setting, (mean, model) in models.items():
+                found = kalman(model, seen - mean, fold.covariances[sd])
+                answers[setting] = tuple(mean + each for each in found)
+            for name, both in answers.items():
+                rows = errors.setdefault(name, {}).setdefault(kind, {})
+                found = [fold.error(postures, x, counts) for postures in both]
+                rows.setdefault(fold.action, []).append(found)
+            wide = 1.645 * np.sqrt(np.diagonal(live.covariances, axis1=1, axis2=2))
+            hidden = np.isnan(seen)
+            if hidden.any():
+                inside = np.abs(live.postures - truth) <= wide
+                bands.setdefault(kind, []).append(inside[hidden].mean())
+        for name, takes in (("right", fold.test), ("other", wrong.test[:1])):
+            for x in takes:
+                moved = x + SMALL * np.random.default_rng(k).standard_normal(x.shape)
+                track = fold.trackers[SMALL].track(fold.cosines.transform([moved])[0])
+                lost.setdefault(name, []).append(track.lost.mean())
+    print_head(f"{archive}, cm, live / smoothed", KINDS)
+    means = {
+        name: np.array([
+            np.mean([np.mean(rows, axis=0) for rows in by_kind[kind].values()], axis=0)
+            for kind in KINDS
+        ])
+        for name, by_kind in errors.items()
+    }  # fmt: skip
+    rows = {"`MotionTracker`": means.pop("`MotionTracker`")}
+    rows["without a phase, the best setting"] = np.min(list(means.values()), axis=0)
+    for name, found in rows.items():
+        print_row(name, [f"{live:.2f} / {smoothed:.2f}" for live, smoothed in found])
+    print_row(
+        "bands of 90 % hold, %", [percent(np.mean(bands.get(kind, np.nan))) for kind in KINDS]
+    )
+    shares = ", ".join(f"{name} {percent(np.mean(each), 1)} %" for name, each in lost.items())
+    print(f"\nFrames called lost, of takes: {shares}.")
 
 
 if __name__ == "__main__":
-    with threadpool_limits(1):
-        main()
+    tables = {name: functools.partial(table, name) for name in STEP}
+    run_tables(tables, command_line(__doc__))
