@@ -1,35 +1,38 @@
-"""Cycles of real people: their period against foot geometry, what is not cyclic, foot strikes.
+"""Cycles of real people: their period against foot geometry, and where a recording repeats.
 
-    python benchmarks/cycles.py DATA_FOLDER
+    python benchmarks/cycles.py DATA_FOLDER [periods] [single] [several] [lengths] [standing]
+        [joined] [gestures]
 
-A foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such a maximum
-stands out by 0.3 of the whole swing. A step is the time from one strike to the next, of either
-foot; a stride that to the next of the same foot. A period is held against twice the median step:
-the jogs begin from standing, and their first stride is longer. The mean stride is shown beside.
-Deviations of foot strikes are those of their phases from the mean phase of the foot, in hundredths
-of a cycle, within takes and within all takes of an action, of strikes within the stretches that
-repeat. Takes are cut by what was learnt from
-other actors or, where there is one actor, from the other takes.
+*Periods*: a foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such
+a maximum stands out by 0.3 of the whole swing. A step is the time from one strike to the next, of
+either foot. A period is held against twice the median step: the jogs begin from standing, and their
+first stride is longer. Deviations of foot strikes are those of their phases from the mean phase of
+the foot, in hundredths of a cycle, within takes and within all takes of an action. Takes are cut by
+what was learnt from other actors or, where there is one actor, from the other takes. *Single*
+actions are not to be cyclic.
 
-Several cycles fit where every second or fourth repetition differs: exercises of UI-PRMD, chained
+*Several* cycles fit where every second or fourth repetition differs: exercises of UI-PRMD, chained
 from repetitions of one person, some of them done wrong. A period is right within 10 % of the mean
 repetition of its stretch, or of two or four where one in so many is wrong. Elsewhere right periods
-that are warned of are false alarms, as for walks and jogs, whole, and for their single limbs, whose
-period is that of the whole body.
+that are warned of are false alarms. *Lengths*: a cut is right if it holds 0.7 to 1.3 repetitions,
+from foot strike to foot strike or along a chain. In shallow chains the last but one repetitions
+have a part of their size, and the path of the phase may stand still through them.
 
-A cut is right if it holds 0.7 to 1.3 repetitions, from foot strike to foot strike or along a chain.
-Its length is a share of the period of its take. Takes in which several cycles fit are left out:
-they have their own warning. In shallow chains the last but one repetitions have a part of their
-size, and the path of the phase may stand still through them.
+*Standing*: walks and jogs have so many times as much standing around them, half of it before, half
+behind. ``freeze`` repeats the first and the last frame. ``sway`` turns within half a second to a
+posture of standing and back, and sways by 1 cm, below about 1 Hz, with 1 mm of noise. ``noise`` has
+1 cm of white noise in all joints as well. A cycle is inside if it begins and ends within the walk;
+a cut is inside alike. *Joined* are single actions, with a jog in the middle. A *gesture* in a long
+take is found if more than half of a stretch lies within its label. Prints Markdown.
 """
 
-import argparse
 import copy
 import functools
 import warnings
 from pathlib import Path
 
 import numpy as np
+from harness import command_line, print_head, print_row, run_tables
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn.model_selection import LeaveOneGroupOut
@@ -56,6 +59,12 @@ CHAIN, EVERY, DRAWS = 12, (0, 2, 4), 3
 SHALLOW, N_SHALLOW = (1, 0.4, 0.2), 2
 # A cut holds one repetition if it holds so much more or less of one.
 RIGHT = 0.3
+GESTURES = ("waveHands", "clapHands")
+# Seconds of the turn to a posture of standing, and of the filter of the sway; sway and noise in m.
+TURN, SLOW, SWAY, NOISE = 0.5, 0.25, 0.01, 0.001
+
+
+# -- cycles -----------------------------------------------------------------------------
 
 
 def read(folder, archive, label):
@@ -263,55 +272,276 @@ def warnings_of_lengths(folder, seeds=8, sizes=SHALLOW):
         yield name, lengths((x, begins, CycleSegmenter()) for x, begins in pairs)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("data", help="folder of hdm05, cmu07_walk and utkinect")
-    folder = parser.parse_args().data
-    inside = {"steps": [], "strides": []}
+# -- standing, and other actions --------------------------------------------------------
+
+
+def turned(pose, other, skeleton):
+    """A posture, turned and shifted so that its pelvis and hips are those of another."""
+    hips = [skeleton.index_of(f"{side}_hip") for side in ("left", "right")]
+    pelvis = skeleton.index_of("pelvis")
+    across = [x[hips[0]] - x[hips[1]] for x in (pose, other)]
+    angle = np.subtract(*(np.arctan2(x[2], x[0]) for x in across[::-1]))
+    cos, sin = np.cos(angle), np.sin(angle)
+    turn = np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+    return (pose - pose[pelvis]) @ turn.T + other[pelvis]
+
+
+def blended(start, end, n):
+    """Postures from one to another, the first excluded, at rest at both."""
+    share = np.minimum(np.arange(1, n + 1) / n, 1)[:, np.newaxis, np.newaxis]
+    return start + share**2 * (3 - 2 * share) * (end - start)
+
+
+def with_standing(walk, factor, kind, rng):
+    """A walk with standing around it, and where in it the walk begins and ends."""
+    points, rate, n = walk["points"], walk["rate"], len(walk["points"])
+    count = round(factor * n / 2)
+    sides = []
+    for end in (points[0], points[-1]):
+        stands = np.repeat(end[np.newaxis], count, axis=0)
+        if kind != "freeze":
+            pose = turned(walk["pose"], end, walk["skeleton"])
+            turn = blended(end, pose, max(round(TURN * rate), 1))
+            stands = np.concatenate([turn, np.repeat(pose[np.newaxis], count, axis=0)])[:count]
+        sides.append(stands)
+    take = np.concatenate([sides[0][::-1], points, sides[1]]).reshape(2 * count + n, -1)
+    if kind != "freeze":
+        outside = np.ones(len(take))
+        outside[count : count + n] = 0
+        slow = gaussian_filter1d(rng.normal(size=take.shape), SLOW * rate, axis=0)
+        slow *= SWAY * walk["unit"] / slow.std()
+        take = take + slow * gaussian_filter1d(outside, 0.1 * rate)[:, np.newaxis]
+        noise = SWAY if kind == "noise" else NOISE
+        take = take + noise * walk["unit"] * rng.normal(size=take.shape)
+    return take, (count, count + n)
+
+
+def walks(folder):
+    """Walks and jogs, each with a posture of standing, and the unit of a metre."""
+    for archive, label in CYCLIC.items():
+        bunch = read(folder, archive, label)
+        poses = {}
+        if archive == "hdm05":
+            bends = read(folder, archive, "depositFloorR")
+            poses = {actor: x[0] for x, actor in zip(bends.data, bends.actor, strict=True)}
+        groups = bunch.actor if len(set(bunch.actor)) > 1 else np.arange(len(bunch.data))
+        for x, rate, actor, group in zip(
+            bunch.data, bunch.frame_rate, bunch.actor, groups, strict=True
+        ):
+            points = np.asarray(x, dtype=float).reshape(len(x), -1, 3)
+            ankles = [bunch.skeleton.index_of(f"{s}_ankle") for s in ("left", "right")]
+            apart = np.linalg.norm(points[:, ankles[0]] - points[:, ankles[1]], axis=1)
+            pose = np.asarray(poses.get(actor, points[apart.argmin()]), dtype=float)
+            yield {
+                "label": label,
+                "points": points,
+                "rate": float(rate),
+                "skeleton": bunch.skeleton,
+                "pose": pose.reshape(-1, 3),
+                "unit": 100.0 if archive == "cmu07_walk" else 1.0,
+                "group": group,
+                "period": references(foot_strikes(x, bunch.skeleton, rate))[0],
+            }
+
+
+def resampled(take, step):
+    """A take at every so many frames, by straight lines."""
+    at = np.arange(0, len(take) - 1, step)
+    return np.stack([np.interp(at, np.arange(len(take)), x) for x in take.T], axis=1)
+
+
+def standing(every, factor, kind, rate=None, seed=0):
+    """Counts of walks: cyclic, right periods; of cycles, inside; of cuts, inside; of stretches."""
+    rng, counts = np.random.default_rng(seed), np.zeros(7, dtype=int)
+    for label in CYCLIC.values():
+        own = [walk for walk in every if walk["label"] == label]
+        takes, ends, periods = [], [], []
+        for walk in own:
+            take, place = with_standing(walk, factor, kind, rng)
+            step = 1 if rate is None else walk["rate"] / rate
+            takes.append(take if rate is None else resampled(take, step))
+            ends.append(np.array(place) / step)
+            periods.append(walk["period"] / step)
+        skeleton = own[0]["skeleton"]
+        report = CycleSegmenter(skeleton).report(takes)
+        counts[0] += report["cyclic"].sum()
+        counts[1] += (np.abs(report["period"] / periods - 1) < 0.05)[report["cyclic"]].sum()
+        if "stretches" in report:
+            counts[6] += report["stretches"].map(len).sum()
+        groups = np.array([walk["group"] for walk in own])
+        for group in np.unique(groups):
+            test = np.flatnonzero(groups == group)
+            others = [takes[i] for i in np.flatnonzero(groups != group)]
+            for side in ("left", "right"):
+                segmenter = CycleSegmenter(skeleton, start=side, not_cyclic="skip").fit(others)
+                table = segmenter.segment([takes[i] for i in test])[1]
+                for i, row in zip(test[table["take"]], table.itertuples(), strict=True):
+                    (first, last), cuts = ends[i], (row.start, row.stop - 1)
+                    inside = [first - 1 <= cut <= last for cut in cuts]
+                    counts[2:6] += [1, all(inside), 2, sum(inside)]
+    return counts
+
+
+def joined(clips, skeleton, rate=120, turn=0.4):
+    """Clips, one after the other, and where each begins and ends."""
+    parts, places, n = [], [], 0
+    for x in clips:
+        points = np.asarray(x, dtype=float).reshape(len(x), -1, 3)
+        if parts:
+            last = parts[-1][-1]
+            parts.append(blended(last, turned(points[0], last, skeleton), round(turn * rate))[:-1])
+            n += len(parts[-1])
+        parts.append(points)
+        places.append((n, n + len(points)))
+        n += len(points)
+    return np.concatenate(parts).reshape(n, -1), places
+
+
+def among_actions(folder, n_actions, draws=24, jogs=False):
+    """Takes of different single actions of a person, with a jog in the middle or none.
+
+    Takes; called cyclic; with the jog found; stretches that are not half of the jog.
+    """
+    rng, counts = np.random.default_rng(n_actions), np.zeros(4, dtype=int)
+    actions = {label: read(folder, "hdm05", label) for label in SINGLE["hdm05"]}
+    bunch = read(folder, "hdm05", CYCLIC["hdm05"])
+    for k in range(len(bunch.data) if jogs else draws):
+        actor = bunch.actor[k] if jogs else rng.choice(np.unique(bunch.actor))
+        labels = rng.choice(list(actions), n_actions, replace=False)
+        clips = []
+        for label in labels:
+            own = np.flatnonzero(actions[label].actor == actor)
+            clips.append(actions[label].data[rng.choice(own)])
+        middle = n_actions // 2
+        if jogs:
+            clips.insert(middle, bunch.data[k])
+        take, places = joined(clips, bunch.skeleton)
+        (row,) = CycleSegmenter(bunch.skeleton).report([take]).itertuples()
+        first, last = places[middle] if jogs else (0, 0)
+        shares = [
+            max(min(stop, last) - max(start, first), 0) / (stop - start)
+            for start, stop in row.stretches
+        ]
+        good = [share > 0.5 for share in shares]
+        counts += [1, row.cyclic, any(good), len(good) - sum(good)]
+    return counts
+
+
+def gestures(folder):
+    """Of clips of a gesture, how many are cyclic; of its labels in takes, how many are found."""
+    file = np.load(f"{folder}/utkinect/utkinect_takes.npz")
+    bunch = load_performances(f"{folder}/utkinect/utkinect_takes.npz")
+    stretches = CycleSegmenter(bunch.skeleton).report(bunch.data)["stretches"].tolist()
+    labels = [file[f"segment_{name}"].tolist() for name in ("take", "label", "start", "stop")]
+    found, n_labels, right = {}, {}, set()
+    numbers = {take: k for k, take in enumerate(dict.fromkeys(labels[0]))}
+    for take, label, first, last in zip(*labels, strict=True):
+        n_labels[label] = n_labels.get(label, 0) + 1
+        for start, stop in stretches[numbers[take]]:
+            if min(stop, last) - max(start, first) > 0.5 * (stop - start):
+                found[label] = found.get(label, 0) + 1
+                right.add((numbers[take], start))
+                break
+    for label in ("walk", *GESTURES):
+        clips = read(folder, "utkinect", label)
+        report = CycleSegmenter(clips.skeleton).report(clips.data)
+        yield label, len(report), int(report["cyclic"].sum()), n_labels[label], found.get(label, 0)
+    others = sum(n for label, n in found.items() if label not in ("walk", *GESTURES))
+    yield "elsewhere in takes", sum(map(len, stretches)) - len(right) + others
+
+
+def exercises(folder):
+    """Exercises that are done once: how many, and how many are called cyclic."""
+    file = np.load(f"{folder}/uiprmd/uiprmd_odd_positions.npz")
+    positions = file["positions"] - file["positions"].mean(axis=1, keepdims=True)
+    takes = np.split(positions.reshape(len(positions), -1), file["offsets"][1:-1])
+    return len(takes), int(CycleSegmenter().report(takes)["cyclic"].sum())
+
+
+# -- tables -----------------------------------------------------------------------------
+
+
+def period_table(folder):
     for archive, label in CYCLIC.items():
         bunch = read(folder, archive, label)
         report = CycleSegmenter(bunch.skeleton).report(bunch.data)
-        print(f"{label}\n  actor   frames  period  strength  cycles  error: steps  strides (%)")
+        print_head(label, ["period", "cycles", "error, %"])
         strikes = []
-        for x, rate, actor, row in zip(
-            bunch.data, bunch.frame_rate, bunch.actor, report.itertuples(), strict=True
-        ):
+        pairs = zip(bunch.data, bunch.frame_rate, report.itertuples(), strict=True)
+        for k, (x, rate, row) in enumerate(pairs):
             strikes.append(foot_strikes(x, bunch.skeleton, rate))
-            errors = [100 * (row.period / period - 1) for period in references(strikes[-1])]
-            for name, error in zip(inside, errors, strict=True):
-                inside[name].append(row.cyclic and abs(error) <= 5)
-            print(
-                f"  {actor:6} {row.n_frames:7d} {row.period:7.1f} {row.strength:9.2f}"
-                f" {row.n_cycles:7.2f} {errors[0]:13.1f} {errors[1]:8.1f}"
-            )
-        print("  deviation of foot strikes:    within takes   all takes (hundredths of a cycle)")
-        found = {}
-        for refine in (False, True):
-            found[refine] = deviations(phases_of_others(bunch, refine=refine), strikes)
-            name = "circular matching" if refine else "constant period"
-            print(f"    {name:20} {found[refine][0]:18.2f} {found[refine][1]:11.2f}")
-        ratio = np.divide(found[True], found[False])
-        print(f"    {'ratio':20} {ratio[0]:18.2f} {ratio[1]:11.2f}")
-    for name, good in inside.items():
-        print(f"period within 5 % by {name}: {sum(good)} of {len(good)}")
-    print("\nnot to be cyclic                takes  called cyclic  highest strength")
+            error = 100 * (row.period / references(strikes[-1])[0] - 1)
+            print_row(k, [f"{row.period:.1f}", f"{row.n_cycles:.2f}", f"{error:.1f}"])
+        print_head("deviations of foot strikes", ["within takes", "all takes"])
+        for name, refine in (("constant period", False), ("circular matching", True)):
+            found = deviations(phases_of_others(bunch, refine=refine), strikes)
+            print_row(name, [f"{x:.2f}" for x in found])
+
+
+def single_table(folder):
+    print_head("not to be cyclic", ["takes", "called cyclic", "highest strength"])
     for archive, labels in SINGLE.items():
         for label in labels:
             bunch = read(folder, archive, label)
             report = CycleSegmenter(bunch.skeleton).report(bunch.data)
-            called, strongest = report["cyclic"].sum(), report["strength"].max()
-            print(f"  {label:30} {len(report):4d} {called:14d} {strongest:17.2f}")
-    print("\nseveral cycles fit         period right, warned of; not right, warned of")
-    for name, counts in warnings_of(folder):
-        print(f"  {name:28}" + "".join(f"{count:8d}" for count in counts))
-    print(
-        "\nlengths of cycles    right cuts: number, shares of the period; takes right, warned of;"
-    )
-    print("                     takes with wrong cuts, warned of")
-    for name, (shares, counts) in warnings_of_lengths(folder):
-        print(f"  {name:28}{len(shares):6d} {min(shares):6.2f} {max(shares):6.2f}", end="")
-        print("".join(f"{count:8d}" for count in counts))
+            counts = [len(report), report["cyclic"].sum()]
+            print_row(label, [*map(str, counts), f"{report['strength'].max():.2f}"])
+    n_takes, called = exercises(folder)
+    print_row("exercises", [str(n_takes), str(called), ""])
 
+
+def several_table(folder):
+    columns = ["period right, warned of", "not warned of", "not right, warned of", "not warned of"]
+    print_head("several cycles fit", columns)
+    for name, counts in warnings_of(folder):
+        print_row(name, map(str, counts))
+
+
+def length_table(folder):
+    columns = ["right cuts", "shares of the period", "takes right, warned of", "with wrong cuts"]
+    print_head("lengths of cycles", columns)
+    for name, (shares, (right, told, wrong, told_wrong)) in warnings_of_lengths(folder):
+        ends = f"{min(shares):.2f} to {max(shares):.2f}"
+        of = [f"{right}, {told}", f"{wrong}, {told_wrong}"]
+        print_row(name, [str(len(shares)), ends, *of])
+
+
+def standing_table(folder):
+    every = list(walks(folder))
+    columns = ["cyclic", "period right", "cycles", "inside", "cuts", "cuts inside", "stretches"]
+    print_head(f"standing, {len(every)} walks", columns)
+    cases = [
+        (factor, kind, None) for kind in ("freeze", "sway", "noise") for factor in (0, 1, 2, 4)
+    ]
+    cases += [(2, kind, rate) for rate in (120, 60, 30, 25) for kind in ("sway", "noise")]
+    for factor, kind, rate in cases:
+        name = f"{factor} x, {kind}" + (f", {rate} Hz" if rate else "")
+        print_row(name, map(str, standing(every, factor, kind, rate)))
+
+
+def joined_table(folder):
+    print_head("joined single actions", ["takes", "cyclic", "jog found", "other stretches"])
+    for n_actions in (2, 3, 4, 5):
+        for jogs in (False, True):
+            counts = among_actions(folder, n_actions, jogs=jogs)
+            print_row(f"{n_actions} actions{' and a jog' if jogs else ''}", map(str, counts))
+
+
+def gesture_table(folder):
+    print_head("utkinect", ["clips", "cyclic", "in takes", "found"])
+    for name, *counts in gestures(folder):
+        print_row(name, [*map(str, counts), *[""] * (4 - len(counts))])
+
+
+TABLES = {
+    "periods": period_table,
+    "single": single_table,
+    "several": several_table,
+    "lengths": length_table,
+    "standing": standing_table,
+    "joined": joined_table,
+    "gestures": gesture_table,
+}
 
 if __name__ == "__main__":
-    main()
+    run_tables(TABLES, command_line(__doc__))

@@ -1,36 +1,30 @@
 """How sure a warp is: the coverage of `Match.interval`, and whom `Match.doubtful` names.
 
-    pip install .
-    python benchmarks/intervals.py DATA_FOLDER
+    python benchmarks/intervals.py DATA_FOLDER [people] [doubts] [known-warps]
 
-The key moments of harness.py, on people that had no part in the fit; the moment of the pattern is to
-lie inside the interval of each clip. Then trials that are wrong (repeated, cut off, backwards, held
-still, of another action) among trials that are right, known warps, what departures and bands make
-of intervals, and the time they take. Prints Markdown.
+*People*: the key moments of harness.py, on people that had no part in the fit; the moment of the
+template is to lie inside the interval of each clip. *Doubts*: trials that are wrong (repeated, cut
+off, backwards, held still, of another action) among trials that are right. Prints Markdown.
 """
 
-import sys
-import time
 import warnings
 from functools import partial
 
 import numpy as np
 from accuracy import CELLS, known_warps
-from harness import EVENTS, THROW, P, fewer_clips, read_people
+from harness import P, command_line, print_head, read_people, run_tables
 from joblib import Parallel, delayed
 from scipy.stats import spearmanr
 from sklearn.model_selection import GroupKFold
-from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
-    ActionModel,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    find_departures,
 )
 from sklearn_motionsync.datasets import make_bending
 
 NOMINAL = (0.8, 0.9, 0.95)
+FIGURES = ("mean error", "half-width of 90 %", "80 %", "90 %", "95 %")
 FEWEST = 20
 
 
@@ -65,11 +59,11 @@ def rank_correlation(events):
     return np.mean([spearmanr(rows[:, 1], rows[:, 0])[0] for rows in several])
 
 
-def people_table(people):
+def people_table(folder):
     """Coverage of each action, and of all pairs."""
+    people = read_people(folder)
     done = Parallel(n_jobs=-1)(delayed(judge)(one) for one in people)
-    print("| people held out | pairs | mean error | half-width of 90 % | 80 % | 90 % | 95 % |")
-    print("|---|---|---|---|---|---|---|")
+    print_head("people held out", ["pairs", *FIGURES])
     for one, events in zip(people, done, strict=True):
         show(f"{one.archive}: `{one.name}`", np.concatenate(list(events.values())))
     events = [rows for some in done for rows in some.values()]
@@ -85,7 +79,6 @@ def people_table(people):
     parts = np.array_split(rows[np.argsort(rows[:, 1])], 4)
     quarters = " ".join(f"{part[:, 0].mean():.1f}" for part in parts)
     print(f"Mean errors by quarter of half-width: {quarters}.\n", flush=True)
-    return done
 
 
 def show(name, rows):
@@ -95,24 +88,6 @@ def show(name, rows):
 def cells(means, digits=1):
     error, width, _, *held = means
     return " | ".join([f"{x:.{digits}f}" for x in (error, width)] + [f"{h:.0%}" for h in held])
-
-
-def constants_table(people, done):
-    """By what half-widths would have to be multiplied, and the coverage elsewhere with that."""
-    archives = sorted({one.archive for one in people})
-    print("| fitted on | half-widths times | coverage there | on the others |\n|---|---|---|---|")
-    for archive in archives:
-        own, others = [], []
-        for one, events in zip(people, done, strict=True):
-            (own if one.archive == archive else others).extend(events.values())
-        ratios = np.concatenate([rows[:, 0] / np.maximum(rows[:, 1], 1e-9) for rows in own])
-        factor = np.quantile(ratios, 0.9)
-        shares = [
-            np.mean(np.concatenate([rows[:, 0] <= factor * rows[:, 1] for rows in some]))
-            for some in (own, others)
-        ]
-        print(f"| {archive} | {factor:.2f} | {shares[0]:.2f} | {shares[1]:.2f} |")
-    print(flush=True)
 
 
 # -- doubtful trials --------------------------------------------------------------------
@@ -156,46 +131,25 @@ def doubts(one, others):
     return [np.mean(some) if some else np.nan for some in shares.values()], np.mean(is_weak)
 
 
-def doubts_table(people):
+def doubts_table(folder):
+    people = read_people(folder)
     work = []
     for one in people:
         others = [x for x in people if x is not one and x.archive == one.archive]
         work.append(delayed(doubts)(one, others))
     done = Parallel(n_jobs=-1)(work)
-    print("| doubtful, people held out | " + " | ".join([*WRONG, OTHER]) + " |")
-    print("|---" * (2 + len(WRONG)) + "|")
+    print_head("doubtful, people held out", [*WRONG, OTHER])
     supported = []
     for one, (shares, weak) in zip(people, done, strict=True):
         supported += [shares] * bool(weak == 0)
         mark = " (not supported)" * bool(weak > 0)
-        print(f"| {one.archive}: `{one.name}`{mark} | " + percent(shares) + " |")
+        print(f"| {one.archive}: `{one.name}`{mark} | " + shown(shares) + " |")
     means = np.nanmean(supported, axis=0)
-    print(f"| **mean of those supported** | {percent(means)} |\n", flush=True)
+    print(f"| **mean of those supported** | {shown(means)} |\n", flush=True)
 
 
-def percent(shares):
+def shown(shares):
     return " | ".join("-" if np.isnan(share) else f"{share:.0%}" for share in shares)
-
-
-def time_line_table(people):
-    """The doubtful among all trials of a fit, and how far their moments lie from the median."""
-    print("| one time line | trials | doubtful | their error | error of the others |")
-    print("|---|---|---|---|---|")
-    for one in people:
-        match = DenseSynchronizer(P).fit(one.X).match(one.X)
-        frames, errors = np.arange(P), []
-        for at in one.moments.values():
-            pairs = zip(at, match.times, strict=True)
-            there = np.array([np.interp(m, t + 1e-7 * frames, frames) for m, t in pairs])
-            errors.append(np.abs(there - np.nanmedian(there)))
-        error, wrong = np.nanmean(errors, axis=0), match.doubtful
-        means = [
-            f"{np.nanmean(error[w]):.1f}" if np.isfinite(error[w]).any() else "-"
-            for w in (wrong, ~wrong)
-        ]
-        print(f"| {one.archive}: `{one.name}` | {len(wrong)} | {wrong.sum()} | ", end="")
-        print(" | ".join(means) + " |", flush=True)
-    print()
 
 
 # -- known warps ------------------------------------------------------------------------
@@ -218,9 +172,8 @@ def held(match, truth, rows):
     ]
 
 
-def known_table(seeds=range(6)):
-    print("| known warps | refined | mean error | half-width of 90 % | 80 % | 90 % | 95 % |")
-    print("|---|---|---|---|---|---|---|")
+def known_table(folder, seeds=range(6)):
+    print_head("known warps", ["refined", *FIGURES])
     for n_features in (1, 4, 16):
         for low, high, noise in CELLS:
             rows, refined = [], []
@@ -253,114 +206,7 @@ def warps_of_phases(phases, pattern):
     return np.array([np.interp(at, *pair) for pair in zip(phases, clocks, strict=True)])
 
 
-# -- what uses them ---------------------------------------------------------------------
-
-
-def departures_table(people, degrees=(20, 30, 40), random_state=0):
-    """The share of departures that timing may explain: as recorded, and of limbs turned away.
-
-    In every trial of people held out one of the twelve limbs is turned for 40 % of the time.
-    """
-    rng, found = np.random.default_rng(random_state), {angle: [] for angle in (0, *degrees)}
-    for one in people:
-        for train, test in GroupKFold(4).split(one.X, groups=one.actors):
-            pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
-            known = [one.postures[i] for i in train]
-            pipe.fit(known, actionmodel__groups=np.asarray(one.actors)[train])
-            for angle, tables in found.items():
-                turned = [turn(one.postures[i], angle, rng) for i in test]
-                table = find_departures(pipe, [x for x, _ in turned])
-                limbs = table["performance"].map(dict(enumerate(limb for _, limb in turned)))
-                own = (table["feature"].str[1:].astype(int) - 1) // 3 == limbs.astype(int)
-                tables.append(table["timing"][own] if angle else table["timing"])
-    print("| departures, people held out | number | timing may explain |\n|---|---|---|")
-    for angle, tables in found.items():
-        timing = np.concatenate(tables).astype(float)
-        name = f"of a limb turned by {angle} degrees" if angle else "as recorded"
-        print(f"| {name} | {len(timing)} | {timing.mean():.0%} |")
-    print(flush=True)
-
-
-def turn(postures, degrees, rng):
-    """Cosines of one limb, drawn at random, turned about a random axis; and the limb."""
-    limb, start, out = int(rng.integers(12)), rng.uniform(0.1, 0.5), postures.copy()
-    axis = rng.standard_normal(3)
-    axis /= np.linalg.norm(axis)
-    share = np.linspace(0, 1, len(out))
-    there = np.clip(np.minimum(share - start, start + 0.4 - share) / 0.05, 0, 1)
-    angle, own = np.deg2rad(degrees) * there[:, np.newaxis], slice(1 + 3 * limb, 4 + 3 * limb)
-    x = out[:, own]
-    along = (x @ axis)[:, np.newaxis] * axis
-    out[:, own] = along + np.cos(angle) * (x - along) + np.sin(angle) * np.cross(axis, x)
-    return out, limb
-
-
-def bands_table(sizes=(8, 16, 40), n_fits=40):
-    """How often a band of 95 % holds the mean of 400 made bends, by fits to some of them."""
-    everybody = make_bending(400, random_state=0)
-    postures = DirectionCosines(everybody.skeleton).fit_transform(everybody.data)
-    pairs, shares = list(zip(postures, everybody.times, strict=True)), np.linspace(0, 1, P)
-    mean = np.mean([at_phases(*pair, shares) for pair in pairs], axis=0)
-    print("| mean inside a band of 95 %, bends | without | with the match | true warps |")
-    print("|---|---|---|---|")
-    for size in sizes:
-        held_by = []
-        for seed in range(n_fits):
-            chosen = np.random.default_rng(seed).permutation(len(pairs))[:size]
-            some = [pairs[i] for i in chosen]
-            curves = [x for x, _ in some]
-            points = ASpace().fit_transform(curves)
-            sync = DenseSynchronizer(P).fit(points)
-            match, phase = sync.match(points), some[sync.pattern_index_][1]
-            at = np.interp(shares, np.linspace(0, 1, len(phase)), phase)
-            target = at_phases(mean, shares, at)
-            model = ActionModel().fit(match.warp(curves))
-            true = ActionModel().fit([at_phases(*pair, at) for pair in some])
-            bands = model.mean_envelope(), model.mean_envelope(match=match), true.mean_envelope()
-            held_by.append([((low <= target) & (target <= high)).all() for low, high in bands])
-        print(f"| {size} of 400 | {percent(np.mean(held_by, axis=0))} |", flush=True)
-    print()
-
-
-def at_phases(x, phase, at):
-    """A trial with these phases of its frames, at other phases."""
-    frames = np.interp(at, phase, np.arange(len(x)))
-    return np.stack([np.interp(frames, np.arange(len(x)), column) for column in x.T], axis=1)
-
-
-# -- time -------------------------------------------------------------------------------
-
-
-def cost_table(people, repeats=15):
-    """The interval of a match over the match itself: medians of ratios, side by side."""
-    print("| time of `interval` over that of `match` | all trials | one trial |\n|---|---|---|")
-    for one in people:
-        sync = DenseSynchronizer(P).fit(one.X)
-        shares = [np.median([ratio(sync, X) for _ in range(repeats)]) for X in (one.X, one.X[:1])]
-        print(f"| `{one.name}`, {len(one.X)} trials | {shares[0]:.2f} | {shares[1]:.2f} |")
-
-
-def ratio(sync, X):
-    start = time.perf_counter()
-    match = sync.match(X)
-    matched = time.perf_counter()
-    match.interval()
-    return (time.perf_counter() - matched) / (matched - start)
-
-
-def main():
-    warnings.simplefilter("ignore")
-    folder = sys.argv[1]
-    people = read_people(folder)
-    constants_table(people, people_table(people))
-    doubts_table(people)
-    throws = [event for event in EVENTS if event[:2] == THROW]
-    time_line_table([*people, fewer_clips(folder, throws, 12)])
-    known_table()
-    departures_table([one for one in people if one.archive == "hdm05"][:4])
-    bands_table()
-    cost_table(people[:3])
-
-
 if __name__ == "__main__":
-    main()
+    warnings.simplefilter("ignore")
+    tables = {"people": people_table, "doubts": doubts_table, "known-warps": known_table}
+    run_tables(tables, command_line(__doc__))

@@ -1,23 +1,32 @@
-"""Key-frames: what one known moment does for the others, labels of a few clips, and wrong labels.
+"""Key-frames: what one known moment does for the others, and wrong labels.
 
-    python benchmarks/keyframes.py DATA_FOLDER [given] [few] [wrong]
+    python benchmarks/keyframes.py DATA_FOLDER [given] [wrong]
 
-``given``: of every two moments of an action (harness.py) one is given, and the error of the other is
-judged on the pairs of clips that show both; with people who had no part in the fit, too. ``few``: a
-fifth of the clips have the moment, and it is judged in the others. ``wrong``: in one clip of five
-the moment that is given is wrong by a tenth of the clip. Errors are in frames of 100, mean and
-median. Prints Markdown.
+*Given*: of every two moments of an action that peers were measured on (harness.py) one is given,
+and the error of the other is judged on the pairs of clips that show both; with people who had no
+part in the fit, too. *Wrong*: in one clip of five the moment that is given is wrong by a tenth of
+the clip. Errors are in frames of 100, mean and median. Prints Markdown.
 """
 
-import sys
+from itertools import permutations
 
 import numpy as np
-from harness import EVENTS, FLOOR, FOLDS, P, read_people
+from harness import (
+    EVENTS,
+    FOLDS,
+    P,
+    command_line,
+    geometric_means,
+    print_head,
+    print_row,
+    read_people,
+    run_tables,
+    show_pair,
+)
 from sklearn.model_selection import GroupKFold
 from sklearn_motionsync import ASpace, DenseSynchronizer, LinearSynchronizer
 
 FRAMES = np.arange(P)
-FEW, DRAWS = 0.2, 4
 
 
 def own_frames(at, X):
@@ -87,15 +96,11 @@ METHODS = {
 # -- what is judged -----------------------------------------------------------------------------
 
 
-def cases(people, peers_only):
+def cases(folder):
     """(one, given, judged) of every two moments of an action."""
-    known = {(e.action, e.name) for e in EVENTS if e.peers}
-    for one in people:
-        for given in one.moments:
-            for judged in one.moments:
-                of_ruler = {(one.name, given), (one.name, judged)} <= known
-                if given != judged and of_ruler == peers_only:
-                    yield one, given, judged
+    for one in read_people(folder, [event for event in EVENTS if event.peers]):
+        for given, judged in permutations(one.moments, 2):
+            yield one, given, judged
 
 
 def errors_to_templates(one, given, judged, method):
@@ -138,83 +143,6 @@ def missed(times, template, at, wanted, rows):
     )
 
 
-def geometric(cells):
-    return np.exp(np.mean(np.log(np.asarray(cells) + FLOOR), axis=0))
-
-
-def given_table(people, errors, peers_only):
-    """A table of all cases and methods."""
-    names = list(METHODS)
-    print(f"| given | judged | pairs | {' | '.join(names)} |")
-    print("|---|---|---|" + "---|" * len(names))
-    rows, exact = {name: [] for name in names}, []
-    hops = {name: [] for name in names}
-    for one, given, judged in cases(people, peers_only):
-        cells = []
-        for name, method in METHODS.items():
-            other, own = errors(one, given, judged, method)
-            pair = np.mean(other), np.median(other)
-            rows[name].append(pair)
-            if "hop" in one.name:
-                hops[name].append(pair)
-            if name == "exact":
-                exact.append(own.max())
-            cells.append(f"{pair[0]:.2f} / {pair[1]:.2f}")
-        title = f"{one.name}: {given}"
-        print(f"| {title} | {judged} | {len(other)} | {' | '.join(cells)} |", flush=True)
-    for title, of_all in (("geometric mean", rows), ("of hops", hops)):
-        pairs = [geometric(of_all[name]) for name in names]
-        cells = " | ".join(f"{mean:.2f} / {median:.2f}" for mean, median in pairs)
-        print(f"| **{title}** | | | {cells} |")
-    print(f"\nLargest distance from a key-frame that is exact: {max(exact):.1e} frames.\n")
-
-
-def few_table(people):
-    """A fifth of the clips have a moment: its error in the others, and without any key-frame."""
-    print("| setting | mean | median | best | worst |\n|---|---|---|---|---|")
-    for std in (0, 3):
-        ratios = []
-        for one in people:
-            for at in one.moments.values():
-                before, after = few_labels(one, at, std)
-                pairs = [(np.mean(e), np.median(e)) for e in (before, after)]
-                ratios.append(np.log(np.add(pairs[1], FLOOR) / np.add(pairs[0], FLOOR)))
-        mean, median = np.exp(np.mean(ratios, axis=0))
-        best, *_, worst = np.exp(np.sort(np.array(ratios)[:, 0]))
-        name = f"`keyframe_std={std}`"
-        print(f"| {name} | {mean:.3f} | {median:.3f} | {best:.2f} | {worst:.2f} |", flush=True)
-
-
-def few_labels(one, at, std):
-    seen, errors = np.flatnonzero(np.isfinite(at)), ([], [])
-    for draw in range(DRAWS):
-        rng = np.random.default_rng(draw)
-        some = rng.permutation(seen)[: max(2, round(FEW * len(seen)))]
-        labels = np.where(np.isin(np.arange(len(at)), some), at, np.nan)
-        others = np.setdiff1d(seen, some)
-        for template in some[:2]:
-            for found, method in zip(errors, (nothing, anchored(std)), strict=True):
-                times = method(one.X, labels, int(template), one.X, labels)[others]
-                met = [np.interp(at[template], FRAMES, tau) for tau in times]
-                found.extend(np.abs(met - at[others]))
-    return errors
-
-
-def wrong_table(people):
-    """One given moment of five is wrong: errors of the other moment, of people not in the fit."""
-    print("| given | mean | median |\n|---|---|---|")
-    kinds = {"nothing": nothing, "exact": anchored(0), "`keyframe_std=3`": anchored(3)}
-    for name, method in kinds.items():
-        for is_wrong in (False, True) if name != "nothing" else (False,):
-            rows = []
-            for one, given, judged in cases(people, True):
-                other, _ = errors_of_others(one, given, judged, mislabelled(method, is_wrong))
-                rows.append((np.mean(other), np.median(other)))
-            mean, median = geometric(rows)
-            title = f"{name}, one of five wrong" if is_wrong else name
-            print(f"| {title} | {mean:.2f} | {median:.2f} |", flush=True)
-
-
 def mislabelled(method, is_wrong):
     """The method given moments of which every fifth is a tenth of the clip early or late."""
 
@@ -232,23 +160,35 @@ def mislabelled(method, is_wrong):
     return times
 
 
-def main():
-    folder, *chosen = sys.argv[1:]
-    people = read_people(folder)
-    if not chosen or "given" in chosen:
-        print("### Twelve cases\n")
-        given_table(people, errors_to_templates, True)
-        print("### The same, of people that had no part in the fit\n")
-        given_table(people, errors_of_others, True)
-        print("### Other moments of these and other actions\n")
-        given_table(people, errors_to_templates, False)
-    if not chosen or "few" in chosen:
-        print("### A fifth of the clips has a key-frame: errors in the others, relative\n")
-        few_table(people)
-    if not chosen or "wrong" in chosen:
-        print("\n### Wrong key-frames\n")
-        wrong_table(people)
+def given_table(folder):
+    """A line of every case, and the means, over all pairs and of people held out."""
+    for title, errors in (("", errors_to_templates), (", people held out", errors_of_others)):
+        print_head(f"given{title}", ["judged", "pairs", *METHODS])
+        rows = {}
+        for one, given, judged in cases(folder):
+            found = [errors(one, given, judged, method)[0] for method in METHODS.values()]
+            rows[one.name, given, judged] = [(np.mean(x), np.median(x)) for x in found]
+            cells = [judged, str(len(found[0])), *map(show_pair, rows[one.name, given, judged])]
+            print_row(f"{one.name}: {given}", cells)
+        hops = {key: row for key, row in rows.items() if "hop" in key[0]}
+        for name, some in (("geometric mean", rows), ("of hops", hops)):
+            pairs = [dict(enumerate(each)) for each in zip(*some.values(), strict=True)]
+            print_row(f"**{name}**", ["", "", *(show_pair(geometric_means(x)) for x in pairs)])
+
+
+def wrong_table(folder):
+    """One given moment of five is wrong: errors of the other moment, of people held out."""
+    print_head("given", ["mean / median"])
+    methods = {name: METHODS[name] for name in ("nothing", "exact", "`keyframe_std=3`")}
+    for name, method in methods.items():
+        for is_wrong in (False, True) if name != "nothing" else (False,):
+            pairs = {}
+            for one, given, judged in cases(folder):
+                other, _ = errors_of_others(one, given, judged, mislabelled(method, is_wrong))
+                pairs[one.name, given, judged] = np.mean(other), np.median(other)
+            title = f"{name}, one of five wrong" if is_wrong else name
+            print_row(title, [show_pair(geometric_means(pairs))])
 
 
 if __name__ == "__main__":
-    main()
+    run_tables({"given": given_table, "wrong": wrong_table}, command_line(__doc__))

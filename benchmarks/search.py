@@ -1,25 +1,20 @@
 """Where in whole recordings an action happens, beside subsequence DTW: the table of docs/design.md.
 
+    python benchmarks/search.py DATA_FOLDER [utkinect] [hdm05]
+
 UTKinect's 20 recordings hold ten actions each, once, labelled by hand. All but two actors at a time
 teach an action by their clips, and the recordings of these two are searched. A hit is right if it
 overlaps a labelled part that no better hit has, by half of what both cover together. All clips of
-an actor of HDM05, joined in any order, are such a recording, too; they are searched at other frame
-rates than that of the clips, without the action, and as an hour. Takes a quarter of an hour.
-
-Other archives of clips that are named are joined at a quarter of their rate, and searched, too.
-
-    python benchmarks/search.py ../shared/data [coverage=0.8 ...] [ARCHIVE.npz ...]
+an actor of HDM05, joined in any order, are such a recording, too. Settings of the search were
+chosen on the first four actors of UTKinect, and the others are reported. Prints Markdown.
 """
 
-import resource
-import sys
-import time
-import warnings
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
+from harness import command_line, print_head, print_row, run_tables
 from scipy.spatial.distance import cdist
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -89,7 +84,7 @@ class Recordings(NamedTuple):
 # -- who searches: (take, start, stop, score), higher is better; only ours knows its threshold ----
 
 
-def ours(recordings, action, held_out, coverage=0.8):
+def ours(recordings, action, held_out):
     clips, actors = recordings.teachers(action, held_out)
     pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
     pipe.fit(clips, actionmodel__groups=actors)
@@ -97,8 +92,9 @@ def ours(recordings, action, held_out, coverage=0.8):
     given = [recordings.takes[i] for i in takes]
     found = {}
     for threshold in ("auto", None):
-        how = {"threshold": threshold, "coverage": coverage, "max_hits": 30}
-        _, locations = find_performances(pipe, given, **how)
+        _, locations = find_performances(
+            pipe, given, threshold=threshold, coverage=0.8, max_hits=30
+        )
         rows = locations[["take", "start", "stop", "score"]].to_numpy()
         found[threshold] = [(takes[int(t)], int(a), int(b), s) for t, a, b, s in rows]
     return found
@@ -184,140 +180,57 @@ def figures(found, parts):
     return [*own, best[2], average]
 
 
-def table(recordings, folds, methods):
-    """Figures (n_methods, n_actions, 5), and how many hits a take without the action gives."""
+METHODS = {
+    "find_performances": ours,
+    "DTW, bounded": partial(dtw, steps=BOUNDED),
+    "DTW, usual": partial(dtw, steps=USUAL),
+    "DTW, standardised": partial(dtw, steps=BOUNDED, standardise=True),
+}
+
+
+def table(name, recordings, folds):
+    """Precision, recall, F1 (ours at its threshold, DTW at its best), best F1, average precision.
+
+    The last column has the hits a take that ours finds outside of the action.
+    """
+    print_head(name, [*METHODS, "false hits a take"])
     rows, false = [], []
     for action in dict.fromkeys(label for *_, label in recordings.parts):
         takes = recordings.takes_of(sum(folds, ()))
         parts = [p for p in recordings.parts if p[3] == action and p[0] in takes]
-        row = []
-        for method in methods:
+        rows.append([])
+        for method in METHODS.values():
             found = {}
             for fold in folds:
                 for threshold, hits in method(recordings, action, fold).items():
                     found.setdefault(threshold, []).extend(hits)
-            row.append(figures(found, parts))
-            hits = found.get("auto", [])
-            apart = [
-                h for h in hits if not any(p[0] == h[0] and overlap(h[1:3], p[1:3]) for p in parts)
-            ]
-            false.append(len(apart) / len(takes))
-        rows.append(row)
-        cells = " | ".join(" ".join(f"{x:.2f}" for x in some) for some in row)
-        print(f"| {action} | {cells} | {false[-len(methods)]:.1f} |", flush=True)
-    means = np.mean(rows, axis=0)
-    cells = " | ".join(" ".join(f"{x:.3f}" for x in some) for some in means)
-    print(f"| mean | {cells} | {np.mean(false[:: len(methods)]):.1f} |", flush=True)
+            rows[-1].append(figures(found, parts))
+            if "auto" in found:
+                apart = [
+                    hit
+                    for hit in found["auto"]
+                    if not any(p[0] == hit[0] and overlap(hit[1:3], p[1:3]) for p in parts)
+                ]
+                false.append(len(apart) / len(takes))
+        show(action, rows[-1], false[-1])
+    show("mean", np.mean(rows, axis=0), np.mean(false))
 
 
-def search_rates(path, taught=4, searched=(1, 2, 4, 8, 16), full=120):
-    """HDM05's joined takes at several frame rates: hits, right and all, with known rates or not."""
-    found = {(every, known): [0, 0] for every in searched for known in (True, False)}
-    teaching, takes = Recordings.joined(path, taught), {}
-    for every in searched:
-        takes[every] = Recordings.joined(path, every)
-    for action in dict.fromkeys(label for *_, label in teaching.parts):
-        for take, actor in enumerate(teaching.actors_of_takes):
-            clips, actors = teaching.teachers(action, [actor])
-            pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
-            pipe.fit([at_rate(x, full / taught) for x in clips], actionmodel__groups=actors)
-            for every, known in found:
-                some = takes[every]
-                given = at_rate(some.takes[take], full / every if known else None)
-                with warnings.catch_warnings():
-                    warnings.filterwarnings("ignore", "Performance 0 has no known frame rate")
-                    _, locations = find_performances(pipe, given)
-                rows = locations[["start", "stop", "score"]].to_numpy()
-                parts = [part for part in some.parts if (part[0], part[3]) == (take, action)]
-                right = judge([(take, *row) for row in rows], parts)
-                found[every, known] += np.array([right.sum(), len(right)])
-    total = len(teaching.parts)
-    print(
-        f"\nHDM05, joined, taught at {full / taught:g} Hz: right of all hits, {total} to be found"
-    )
-    for every in searched:
-        cells = " | ".join("{} of {}".format(*found[every, known]) for known in (True, False))
-        print(f"| {full / every:g} | {cells} |", flush=True)
+def show(name, row, false):
+    print_row(name, [*(" ".join(f"{x:.2f}" for x in some) for some in row), f"{false:.1f}"])
 
 
-def search_without(recordings):
-    """Takes without the action: hits, all of which are wrong, and hints of another rate."""
-    n_hits = n_hints = n_takes = 0
-    for action in dict.fromkeys(label for *_, label in recordings.parts):
-        for take, actor in enumerate(recordings.actors_of_takes):
-            clips, actors = recordings.teachers(action, [actor])
-            pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
-            pipe.fit(clips, actionmodel__groups=actors)
-            kept = np.ones(len(recordings.takes[take]), dtype=bool)
-            for part in recordings.parts:
-                if (part[0], part[3]) == (take, action):
-                    kept[slice(*part[1:3])] = False
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
-                n_hits += len(find_performances(pipe, recordings.takes[take][kept])[1])
-            n_hints += any("No window" in str(each.message) for each in caught)
-            n_takes += 1
-    print(f"\nHDM05, joined, {n_takes} takes without the action: {n_hits} hits, {n_hints} hints")
-
-
-def search_hour(recordings, action, n_frames=108_000):
-    """An hour at 30 frames a second, of takes one after the other with noise: time and memory."""
-    clips, actors = recordings.teachers(action, recordings.actors_of_takes[:1])
-    pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
-    pipe.fit(clips, actionmodel__groups=actors)
-    takes = np.concatenate(recordings.takes)
-    hour = np.resize(takes, (n_frames, takes.shape[1]))
-    hour += 0.003 * np.random.default_rng(0).standard_normal(hour.shape)
-    # In kilobytes on Linux.
-    before, begin = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
-    _, locations = find_performances(pipe, hour, frame_rate=30, pattern_rate=30)
-    seconds = time.perf_counter() - begin
-    more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    print(
-        f"an hour, {action}: {len(locations)} hits, {seconds:.0f} s, {more:.0f} MB more than before"
-    )
-
-
-def at_rate(x, rate):
-    """A table that tells its frame rate, if it has one."""
-    df = pd.DataFrame(x)
-    if rate is not None:
-        df.attrs["frame_rate"] = rate
-    return df
-
-
-def main():
-    folder = Path(sys.argv[1])
+def utkinect(folder):
     recordings = Recordings.read(folder / "utkinect")
-    joined = Recordings.joined(folder / "hdm05" / "hdm05_positions.npz")
-    settings = {k: float(v) for k, v in (text.split("=") for text in sys.argv[2:] if "=" in text)}
+    table("UTKinect, chosen on", recordings, FOLDS[:CHOSEN_ON])
+    table("UTKinect, reported", recordings, FOLDS[CHOSEN_ON:])
 
-    def search(*given):
-        return ours(*given, **settings)
 
-    methods = [search]
-    for steps in (BOUNDED, USUAL):
-        methods.append(lambda *given, steps=steps: dtw(*given, steps))
-    methods.append(lambda *given: dtw(*given, BOUNDED, standardise=True))
-    print("Precision, recall, F1 (ours at its threshold, DTW at its best), best F1, AP")
-    head = "find_performances | DTW, bounded | DTW, usual | DTW, standardised | false hits a take"
-    runs = [
-        ("chosen on", recordings, FOLDS[:CHOSEN_ON]),
-        ("reported", recordings, FOLDS[CHOSEN_ON:]),
-        ("HDM05, joined", joined, [(actor,) for actor in joined.actors_of_takes.tolist()]),
-    ]
-    for path in (text for text in sys.argv[2:] if text.endswith(".npz")):
-        more = Recordings.joined(path, 4)
-        runs.append((Path(path).stem, more, [(actor,) for actor in more.actors_of_takes.tolist()]))
-    for name, some, folds in runs:
-        print(f"\n| {name} | {head} |\n|---|---|---|---|---|---|")
-        table(some, folds, methods)
-    search_rates(folder / "hdm05" / "hdm05_positions.npz")
-    at_30 = Recordings.joined(folder / "hdm05" / "hdm05_positions.npz", 4)
-    search_without(at_30)
-    search_hour(at_30, "depositFloorR")
-    search_hour(recordings, "throw")
+def hdm05(folder):
+    recordings = Recordings.joined(folder / "hdm05" / "hdm05_positions.npz")
+    actors = recordings.actors_of_takes.tolist()
+    table("HDM05, joined", recordings, [(actor,) for actor in actors])
 
 
 if __name__ == "__main__":
-    main()
+    run_tables({"utkinect": utkinect, "hdm05": hdm05}, command_line(__doc__))

@@ -6,7 +6,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def stretches(benchmark):
-    return benchmark("stretches")
+    return benchmark("cycles")
 
 
 @pytest.fixture(scope="module")
