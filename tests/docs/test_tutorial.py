@@ -79,9 +79,8 @@ def test_tutorial_block_prints_the_documented_output(sessions, name, number):
 
 # Blocks of Python that no test pastes, and why.
 NOT_RUN = {
-    "howto/cluster.md": 2,  # Ray is no requirement, and progress bars need scikit-learn 1.9
-    "howto/other_tools.md": 4,  # these packages are no requirements
-    "scaling.md": 2,  # as on that page
+    "howto/other_tools.md": 3,  # these packages are no requirements
+    "scaling.md": 2,  # Ray is no requirement, and progress bars need scikit-learn 1.9
 }
 # Files for these are made by tests/docs/test_journeys.py.
 RUN_ON_FILES = ("howto/journeys.md", "howto/motion_files.md")
