@@ -79,7 +79,7 @@ def test_tutorial_block_prints_the_documented_output(sessions, name, number):
 
 # Blocks of Python that no test pastes, and why.
 NOT_RUN = {
-    "howto/other_tools.md": 3,  # these packages are no requirements
+    "howto/other_tools.md": 2,  # these packages are no requirements
     "scaling.md": 2,  # Ray is no requirement, and progress bars need scikit-learn 1.9
 }
 # Files for these are made by tests/docs/test_journeys.py.
