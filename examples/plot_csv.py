@@ -57,6 +57,7 @@ display = SynchronizationDisplay.from_predictions(
     features=["knee_flexion", "vertical_force"],
     groups=gait.group,
     unit="percent",
+    xlabel="% gait cycle",
 )
 display.axes_[0].set_ylabel("knee flexion (degrees)")
 display.axes_[2].set_ylabel("vertical force\n(body weights)")

@@ -1,6 +1,7 @@
 """Arguments that several displays take: names, indices, frames, performances, and live takes."""
 
 from collections.abc import Iterable, Mapping, Set
+from itertools import takewhile
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -9,9 +10,11 @@ import pandas as pd
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
+from ..inputs.facts import units_of_columns
 from ..inputs.numbers import is_integer
 from ..inputs.tables import labels_of
 from ..online.stream import check_times
+from ..utils.pipelines import flat_steps
 
 if TYPE_CHECKING:
     from matplotlib.animation import Animation
@@ -36,6 +39,7 @@ __all__ = [
     "labels_of_signals",
     "one_each",
     "times_from_zero",
+    "undo_scaling",
 ]
 
 # Labels of the time axis of live takes, by unit.
@@ -164,6 +168,47 @@ def times_from_zero(times, n_frames):
         return np.arange(float(n_frames))
     times = np.asarray(times, dtype=np.float64)
     return times - times[0]
+
+
+def undo_scaling(before, X, width):
+    """What takes features back before the scalers of a pipeline, and the units they then have.
+
+    Parameters
+    ----------
+    before : Pipeline or None
+        The steps before an estimator. Synchronizers among them change no features.
+    X : performances, as the pipeline takes them, or None
+    width : int
+        The number of features that reach the estimator.
+
+    Returns
+    -------
+    undo : callable
+        Of arrays (n_frames, width), also with features beside those that were scaled.
+    units : dict of str to str
+        By the names of columns of X; empty where other steps than scalers have made the features.
+    """
+    steps = [] if before is None else flat_steps(before)
+    steps = [step for step in reversed(steps) if not hasattr(step, "match")]
+    scalers = list(takewhile(lambda step: _keeps_features(step, width), steps))
+
+    def undo(x):
+        for step in scalers:
+            n_scaled = step.n_features_in_
+            x = np.column_stack([step.inverse_transform(x[:, :n_scaled]), x[:, n_scaled:]])
+        return x
+
+    collection = None if X is None or len(scalers) < len(steps) else as_collection(X)
+    return undo, {} if collection is None else units_of_columns(collection[0])
+
+
+def _keeps_features(step, width):
+    """Whether a step can be inverted, and its features are those before it, as of scalers."""
+    count = getattr(step, "n_features_in_", width + 1)
+    if count > width or not hasattr(step, "inverse_transform"):
+        return False
+    names = getattr(step, "feature_names_in_", [f"x{i}" for i in range(count)])
+    return list(step.get_feature_names_out()) == list(names)
 
 
 class Takes:

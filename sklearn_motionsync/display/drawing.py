@@ -333,6 +333,15 @@ class GroupCurves(NamedTuple):
         bounds = (x[:, chosen] for x in self[:3])
         return GroupCurves(*bounds, shown, *self[4:])
 
+    def through(self, function):
+        """The same after a function of arrays (P, n_panels)."""
+        performances, bounds = self.performances, self[1:3]
+        if performances is not None:
+            performances = np.stack([function(x) for x in performances])
+        if self.has_band:
+            bounds = map(function, bounds)
+        return GroupCurves(function(self.mean), *bounds, performances, *self[4:])
+
     def outer_bounds(self):
         """The bounds with a margin for rounding."""
         largest = np.nanmax(np.abs([self.lower, self.upper]), axis=(0, 1), initial=0)

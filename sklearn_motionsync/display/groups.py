@@ -144,6 +144,7 @@ class GroupDisplay:
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         unit: Unit = "percent",
         frame_rate: float | ValuesLike | None = None,
+        xlabel: str | None = None,
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
@@ -191,6 +192,8 @@ class GroupDisplay:
             Unit of time, as in `compare_groups`.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X, for seconds; by default what tables tell.
+        xlabel : str, default=None
+            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
@@ -241,6 +244,7 @@ class GroupDisplay:
             events=events,
             ylabel=ylabel,
             units=units,
+            xlabel=xlabel,
         )
         return display.plot(ax)
 
@@ -368,6 +372,7 @@ def display_of_groups(
     events=None,
     ylabel=None,
     units=None,
+    xlabel=None,
 ):
     """The display of performances that are matched already: `AlignedCurves` of ``features``.
 
@@ -409,7 +414,7 @@ def display_of_groups(
     return GroupDisplay(
         of_groups,
         offsets,
-        TimeAxis.of_clock(aligned.unit, aligned.clock),
+        TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel),
         ylabels=ylabels,
         feature_names=names,
         title=f"{title}; {note}" if note else title,

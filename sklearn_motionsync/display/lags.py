@@ -35,6 +35,8 @@ class LagDisplay:
     ----------
     lags : Lags
         The result of `PartSynchronizer.lags`.
+    xlabel : str, default=None
+        The label of time axes.
 
     Attributes
     ----------
@@ -69,8 +71,8 @@ class LagDisplay:
     LagDisplay(5 parts behind the rest of the body, 6 trials of 4 people)
     """
 
-    def __init__(self, lags: Lags) -> None:
-        self.lags = lags
+    def __init__(self, lags: Lags, *, xlabel: str | None = None) -> None:
+        self.lags, self.xlabel = lags, xlabel
 
     def __repr__(self):
         return f"LagDisplay({self._describe()})"
@@ -84,6 +86,7 @@ class LagDisplay:
         groups: Labels | None = None,
         unit: Unit = "percent",
         frame_rate: float | ValuesLike | None = None,
+        xlabel: str | None = None,
         ax: AxesLike | None = None,
         colorbar: bool = True,
         **params: Any,
@@ -103,6 +106,8 @@ class LagDisplay:
         frame_rate : float or array-like (n_sequences,), default=None
             Frames a second of the performances, for seconds; by default what tables tell, as in
             `Match.to_frame`.
+        xlabel : str, default=None
+            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes, or one for the map and one for each part, default=None
             A subplot to be divided, or one axes a panel. None makes a figure.
         colorbar : bool, default=True
@@ -126,11 +131,16 @@ class LagDisplay:
             unit=unit,
             frame_rate=rates_of(X, frame_rate, unit),
         )
-        return cls(lags).plot(ax, colorbar=colorbar)
+        return cls(lags, xlabel=xlabel).plot(ax, colorbar=colorbar)
 
     @classmethod
     def from_predictions(
-        cls, lags: Lags, *, ax: AxesLike | None = None, colorbar: bool = True
+        cls,
+        lags: Lags,
+        *,
+        xlabel: str | None = None,
+        ax: AxesLike | None = None,
+        colorbar: bool = True,
     ) -> Self:
         """Draw lags that are known already.
 
@@ -138,6 +148,8 @@ class LagDisplay:
         ----------
         lags : Lags
             The result of `PartSynchronizer.lags`.
+        xlabel : str, default=None
+            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes, or one for the map and one for each part, default=None
             A subplot to be divided, or one axes a panel. None makes a figure.
         colorbar : bool, default=True
@@ -157,7 +169,7 @@ class LagDisplay:
             raise ValueError(
                 f"lags must be the result of PartSynchronizer.lags; got {type(lags).__name__}."
             )
-        return cls(lags).plot(ax, colorbar=colorbar)
+        return cls(lags, xlabel=xlabel).plot(ax, colorbar=colorbar)
 
     def plot(self, ax: AxesLike | None = None, *, colorbar: bool = True) -> Self:
         """Draw.
@@ -182,7 +194,8 @@ class LagDisplay:
         cells = [(slice(0, 2), slice(None)), *curves_at]
         size = (WIDTH, 0.6 + 1.6 * (2 + n_rows))
         self.figure_, (self.map_ax_, *self.axes_) = panels(ax, cells, 2 + n_rows, n_cols, size)
-        axis = TimeAxis("frames" if self.lags.unit == "frames" else "percent", n_frames)
+        unit = "frames" if self.lags.unit == "frames" else "percent"
+        axis = TimeAxis(unit, n_frames, label=self.xlabel)
         table = self.lags.over_time()
         columns = {
             name: table[name].to_numpy().reshape(n_parts, n_frames)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -14,11 +14,12 @@ from ..inputs.collections import as_collection
 from ..inputs.features import choose_features
 from ..inputs.types import Features, Labels, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
+from ..model.action_model import ActionModel
 from ..model.views import view_of
 from ..synchronizers.match import rates_of
 from ..utils.groups import encode_groups
-from ..utils.pipelines import with_frame_rate
-from .arguments import AxesLike
+from ..utils.pipelines import find_step, with_frame_rate
+from .arguments import AxesLike, labels_of_signals, undo_scaling
 from .drawing import WIDTH, GroupCurves, group_styles, legend_above, panels
 from .time_axis import TimeAxis, draw_keyframes, keyframes_of_estimator
 
@@ -51,6 +52,8 @@ class ActionModelDisplay:
         The clock of the pattern.
     feature_names : list of str
         The names of the features.
+    units : dict of str to str, default=None
+        Their units by name, as far as they are known.
     title : str, default=""
         The meaning of the band, for the legend.
     departures : bool, default=False
@@ -95,11 +98,13 @@ class ActionModelDisplay:
         axis: TimeAxis,
         *,
         feature_names: Sequence[str],
+        units: Mapping[str, str] | None = None,
         title: str = "",
         departures: bool = False,
         keyframes: pd.Series | None = None,
     ) -> None:
         self.groups, self.axis, self.feature_names = groups, axis, feature_names
+        self.units = {name: "" for name in feature_names} | dict(units or {})
         self.title, self.departures, self.keyframes = title, departures, keyframes
 
     def __repr__(self):
@@ -118,6 +123,7 @@ class ActionModelDisplay:
         people: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
+        xlabel: str | None = None,
         keyframe_lines: bool = True,
         ax: AxesLike | None = None,
         **params: Any,
@@ -134,7 +140,8 @@ class ActionModelDisplay:
             Features of the model, by index or name. In a pipeline with an `ASpace` they may also
             be features of the postures, such as ``"pelvis_height"`` or ``"left_leg_y"``: the
             model is then fitted again on the postures of the performances that it keeps. By default
-            the first four of the model.
+            the first four of the model. What scalers before the model do to its own features is
+            undone, and tables tell units in ``attrs["units"]``.
         band : {"points", "performances", "mean"}, default=None
             The band about the mean, named in the legend; by default ``"performances"``, without X
             ``"points"``:
@@ -165,6 +172,8 @@ class ActionModelDisplay:
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X as recorded, for seconds, by default what tables tell, as in
             `Match.to_frame`; without X those of the clock.
+        xlabel : str, default=None
+            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         keyframe_lines : bool, default=True
             Whether to draw the key-frames of the synchronizer, if it has some.
         ax : Axes or array-like of Axes, default=None
@@ -212,20 +221,22 @@ class ActionModelDisplay:
             of_groups = [_curves_of_all(view, band, shown)]
         else:
             of_groups = curves_of_groups(view.model, shown, groups, people, band)
+        n_frames, lengths, rates, units = len(view.model.mean_), None, frame_rate, {}
+        if view.model is view.own:
+            before, model = find_step(estimator, ActionModel)
+            undo, units = undo_scaling(before, X, model.mean_.shape[1])
+            of_groups = [curves.through(undo) for curves in of_groups]
         if unit == "seconds" and X is not None:
-            axis = TimeAxis(unit, len(view.model.mean_), _lengths(X), rates_of(X, frame_rate))
-        else:
-            axis = TimeAxis(unit, len(view.model.mean_), None, frame_rate)
+            lengths, rates = _lengths(X), rates_of(X, frame_rate)
         title = (_BAND_TITLES if groups is None else _GROUP_BAND_TITLES)[band]
         display = cls(
             [curves.of_features(chosen) for curves in of_groups],
-            axis,
+            TimeAxis(unit, n_frames, lengths, rates, xlabel),
             feature_names=[view.names[i] for i in chosen],
+            units=units,
             title=title.format(share=100 * view.model.coverage),
             departures=departures and band != "mean",
-            keyframes=keyframes_of_estimator(
-                estimator, len(view.model.mean_), params.get("keyframes")
-            ),
+            keyframes=keyframes_of_estimator(estimator, n_frames, params.get("keyframes")),
         )
         return display.plot(ax, keyframe_lines=keyframe_lines)
 
@@ -252,9 +263,10 @@ class ActionModelDisplay:
         height = max(3, 1.9 * n_rows + 1.4) + 0.2 * max(len(self.groups) - 3, 0)
         self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, (WIDTH, height))
         self.mean_, self.envelope_, self.performances_, self.departures_ = [], [], [], []
-        for i, (axis, name) in enumerate(zip(self.axes_, self.feature_names, strict=True)):
+        labels = labels_of_signals(self.feature_names, self.units)
+        for i, (axis, label) in enumerate(zip(self.axes_, labels, strict=True)):
             self._draw_feature(axis, i)
-            axis.set_ylabel(name)
+            axis.set_ylabel(label)
             if i + n_cols >= count:
                 axis.set_xlabel(self.axis.label)
         self.keyframes_ = []

@@ -33,6 +33,8 @@ class NormDisplay:
         The signals that are drawn, by index.
     labels : list of str
         Their labels.
+    xlabel : str, default=None
+        The label of the time axis.
 
     Attributes
     ----------
@@ -68,9 +70,10 @@ class NormDisplay:
         subject: Hashable,
         signals: Sequence[int],
         labels: Sequence[str],
+        xlabel: str | None = None,
     ) -> None:
         self.comparison, self.subject = comparison, subject
-        self.signals, self.labels = signals, labels
+        self.signals, self.labels, self.xlabel = signals, labels, xlabel
 
     def __repr__(self):
         return f"NormDisplay({self.comparison.describe(self.subject)!r})"
@@ -84,6 +87,7 @@ class NormDisplay:
         features: Features | None = None,
         ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
+        xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw a subject of a comparison.
@@ -102,6 +106,8 @@ class NormDisplay:
         units : str, list of str or dict, default=None
             Units of the signals for their labels: of all, one each, or by name. By default what
             tables tell.
+        xlabel : str, default=None
+            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -136,7 +142,7 @@ class NormDisplay:
         names = [signals[k] for k in chosen]
         known_units = dict(zip(comparison.features, comparison.units, strict=True))
         labels = labels_of_signals(names, known_units, ylabel, units)
-        return cls(comparison, subject, chosen, labels).plot(ax)
+        return cls(comparison, subject, chosen, labels, xlabel).plot(ax)
 
     def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
@@ -154,7 +160,7 @@ class NormDisplay:
         """
         norm = self.comparison
         subject = norm.verdicts.index.get_loc(self.subject)
-        axis_of_time = TimeAxis.of_clock(norm.unit, norm.clock)
+        axis_of_time = TimeAxis.of_clock(norm.unit, norm.clock, self.xlabel)
         self.figure_, self.axes_, top = signal_panels(ax, len(self.signals), 1.0)
         self.subject_, self.mean_, self.bands_ = [], [], []
         self.spread_, self.departures_ = [], []

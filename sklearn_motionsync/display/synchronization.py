@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
 
+from ..inputs.collections import as_collection
+from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import as_numbers, check_finite, check_names, nanmean
 from ..inputs.types import (
@@ -24,7 +26,7 @@ from ..inputs.wording import counted
 from ..synchronizers.match import Match, check_coverage, match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer, with_frame_rate
-from .arguments import AxesLike, as_names
+from .arguments import AxesLike, as_names, labels_of_signals, undo_scaling
 from .drawing import (
     COLORS,
     WIDTH,
@@ -75,6 +77,8 @@ class SynchronizationDisplay:
         The times of the frames of performances and pattern.
     feature_names : list of str
         The names of the features.
+    units : dict of str to str, default=None
+        Their units by name, as far as they are known.
     pattern : array-like, shape (P, n_shown), default=None
         Drawn in front; by default the mean of the synchronised performances.
     pattern_index : int, default=None
@@ -131,6 +135,7 @@ class SynchronizationDisplay:
         axis: TimeAxis,
         *,
         feature_names: Sequence[str],
+        units: Mapping[str, str] | None = None,
         pattern: PerformanceLike | None = None,
         pattern_index: int | None = None,
         groups: Labels | None = None,
@@ -141,6 +146,7 @@ class SynchronizationDisplay:
         self.before, self.after = [np.asarray(x) for x in before], np.asarray(after)
         self.match, self.times = match, match.times
         self.axis, self.feature_names = axis, feature_names
+        self.units = {name: "" for name in feature_names} | dict(units or {})
         self.pattern = None if pattern is None else np.asarray(pattern)
         self.pattern_index, self.coverage = pattern_index, coverage
         self.groups = None if groups is None else list(map(str, groups))
@@ -164,6 +170,7 @@ class SynchronizationDisplay:
         groups: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
+        xlabel: str | None = None,
         warps: bool = True,
         keyframe_lines: bool = True,
         coverage: float | None = 0.9,
@@ -180,7 +187,8 @@ class SynchronizationDisplay:
             As the estimator takes them.
         features : int, str or list of them, default=None
             Features by index or name, as they reach the synchronizer, such as dimensions of the
-            aSpace. By default the first four.
+            aSpace. By default the first four. What scalers before the synchronizer do is undone,
+            and tables tell units in ``attrs["units"]``.
         groups : sequence of length n_sequences, default=None
             The group of each performance, such as ``bunch.actor``. Groups have different colours,
             and their means are drawn; all are on the clock of the same pattern.
@@ -190,6 +198,8 @@ class SynchronizationDisplay:
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X, for seconds; by default what tables tell, as in
             `Match.to_frame`.
+        xlabel : str, default=None
+            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         warps : bool, default=True
             Whether to draw tau(p) against the diagonal.
         keyframe_lines : bool, default=True
@@ -216,19 +226,23 @@ class SynchronizationDisplay:
         params = with_frame_rate(params, frame_rate)
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         before, synchronizer, performances = reached[:3]
-        names = names_of_features(before, synchronizer, performances[0].shape[1])
+        width = performances[0].shape[1]
+        names = names_of_features(before, synchronizer, width)
         chosen = choose_features(features, names)
-        match, shown = reached.match(), [x[:, chosen] for x in performances]
+        undo, units = undo_scaling(before, X, width)
+        match, shown = reached.match(), [undo(x)[:, chosen] for x in performances]
         groups = None if groups is None else names_of_groups(groups, len(performances))
         lengths = [len(x) for x in shown]
-        axis = TimeAxis(unit, match.times.shape[1], lengths, rates_of(X, frame_rate, unit))
+        rates = rates_of(X, frame_rate, unit)
+        axis = TimeAxis(unit, match.times.shape[1], lengths, rates, xlabel)
         display = cls(
             shown,
             match.warp(shown),
             match,
             axis,
             feature_names=[names[i] for i in chosen],
-            pattern=synchronizer.pattern_[:, chosen],
+            units=units,
+            pattern=undo(synchronizer.pattern_)[:, chosen],
             pattern_index=index_of_pattern(synchronizer, performances),
             groups=groups,
             keyframes=own_keyframes(synchronizer, performances, params),
@@ -249,6 +263,7 @@ class SynchronizationDisplay:
         groups: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
+        xlabel: str | None = None,
         warps: bool = True,
         keyframes: NumbersLike | None = None,
         pattern_keyframes: ValuesLike | None = None,
@@ -277,6 +292,8 @@ class SynchronizationDisplay:
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X, for seconds; by default what tables tell, as in
             `Match.to_frame`.
+        xlabel : str, default=None
+            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         warps : bool, default=True
             Whether to draw tau(p) against the diagonal.
         keyframes : array-like, shape (n_sequences, n_keyframes), default=None
@@ -322,13 +339,15 @@ class SynchronizationDisplay:
         chosen = choose_features(features, feature_names)
         shown = [x[:, chosen] for x in arrays]
         lengths = [len(x) for x in shown]
-        axis = TimeAxis(unit, match.times.shape[1], lengths, rates_of(X, frame_rate, unit))
+        rates = rates_of(X, frame_rate, unit)
+        axis = TimeAxis(unit, match.times.shape[1], lengths, rates, xlabel)
         display = cls(
             shown,
             match.warp(shown),
             match,
             axis,
             feature_names=[feature_names[i] for i in chosen],
+            units=units_of_columns(as_collection(X)[0]),
             pattern=None if pattern is None else pattern[:, chosen],
             groups=groups,
             keyframes=keyframes,
@@ -373,14 +392,15 @@ class SynchronizationDisplay:
         self.figure_, self.axes_ = panels(ax, cells, n_all, 2, size)
         clock, times = self.axis.clock, self.axis.performances()
         self.before_, self.after_, self.pattern_, self.group_means_ = [], [], [], []
-        for row, name in enumerate(self.feature_names):
+        labels = labels_of_signals(self.feature_names, self.units)
+        for row, label in enumerate(labels):
             left, right = self.axes_[2 * row : 2 * row + 2]
             before, after = [x[:, row] for x in self.before], self.after[:, :, row]
             self.before_.append(self._draw_trials(left, times, before, colors))
             self.after_.append(self._draw_trials(right, [clock] * len(after), after, colors))
             self.group_means_.append(self._draw_means(right, clock, row, styles))
             self.pattern_.append(self._draw_pattern(right, clock, row))
-            left.set_ylabel(name)
+            left.set_ylabel(label)
             right.sharey(left)
             right.autoscale_view()
             if row == 0:

@@ -50,6 +50,8 @@ class TimeAxis:
         the clock.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second, for seconds only.
+    label : str, default=None
+        In place of the axis labels.
 
     Attributes
     ----------
@@ -61,9 +63,11 @@ class TimeAxis:
         Axis labels of the clock and of the performances.
     """
 
-    def __init__(self, unit, n_frames, lengths=None, frame_rate=None):
+    def __init__(self, unit, n_frames, lengths=None, frame_rate=None, label=None):
         self.unit = check_unit(unit)
         self.label, self.performance_label = _CLOCK_LABELS[unit], _PERFORMANCE_LABELS[unit]
+        if label is not None:
+            self.label = self.performance_label = label
         self._lengths, self._rates = lengths, None
         clock = np.arange(n_frames)
         self.clock = clock
@@ -75,9 +79,9 @@ class TimeAxis:
             self.clock = np.median(durations) * clock / (n_frames - 1)
 
     @classmethod
-    def of_clock(cls, unit, clock):
+    def of_clock(cls, unit, clock, label=None):
         """The axis of a clock whose frames have these times, in the unit."""
-        return cls(unit, len(clock), None, clock_rate(clock))
+        return cls(unit, len(clock), None, clock_rate(clock), label)
 
     def performances(self):
         """The times of the frames of each performance: list of ndarray (n_frames_i,)."""

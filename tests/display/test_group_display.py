@@ -139,7 +139,9 @@ def test_trials_seconds_and_labels(pipe):
         frame_rate=100,
         ylabel="knee",
         units={"knee_flexion": "degrees"},
+        xlabel="time of the cycle (s)",
     )
+    assert display.axes_[1].get_xlabel() == "time of the cycle (s)"
     assert display.axes_[0].get_ylabel() == "knee (degrees)"
     assert display.axes_[1].get_ylabel().startswith("offset (s)")
     seconds = (np.median([len(x) for x in TRIALS]) - 1) / 100

@@ -39,7 +39,8 @@ def test_map_shows_the_mean_and_hatches_intervals_around_zero(lags):
 
 
 def test_curves_show_mean_interval_and_standard_deviation(lags):
-    display = LagDisplay.from_predictions(lags, colorbar=False)
+    display = LagDisplay.from_predictions(lags, colorbar=False, xlabel="% gait cycle")
+    assert {axis.get_xlabel() for axis in (display.map_ax_, *display.axes_)} == {"% gait cycle"}
     assert display.colorbar_ is None
     for i, part in enumerate(["arm", "leg"]):
         table = lags.over_time().loc[part]

@@ -64,8 +64,11 @@ def test_signals_with_departures_are_shown_first():
     quiet = NormDisplay.from_comparison(found, 18)
     assert quiet.labels == ["x0", "x1", "x2", "x3"]
     assert "departs" not in texts(quiet.axes_[0])
-    one = NormDisplay.from_comparison(found, 19, features="x5", ylabel="knee")
+    one = NormDisplay.from_comparison(
+        found, 19, features="x5", ylabel="knee", xlabel="% gait cycle"
+    )
     assert one.axes_[0].get_ylabel() == "knee"
+    assert one.axes_[-1].get_xlabel() == "% gait cycle"
 
 
 def test_refused_arguments(found):

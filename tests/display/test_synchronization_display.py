@@ -8,15 +8,19 @@ from artists import segments, texts, ys
 from matplotlib.colors import to_rgba
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import FunctionTransformer
+from sklearn.preprocessing import FunctionTransformer, StandardScaler
 from sklearn_motionsync import (
     ActionModel,
     DenseSynchronizer,
+    DirectionCosines,
+    FrameWise,
     LinearSynchronizer,
     Match,
     PartSynchronizer,
+    TimingChannel,
     to_frame,
 )
+from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay
 
 GROUPS = ["young", "old", "young", "old", "young", "old", "young", "old", "one"]
@@ -337,3 +341,69 @@ def test_gaps_and_keyframes_are_drawn_with_bands(bunch, pipe):
     assert len(display.keyframes_) == 2
     assert np.isnan(segments(display.before_[0])[3]).any()
     display.figure_.canvas.draw()
+
+
+# -- signals as recorded ---------------------------------------------------------------------
+
+
+def test_scaled_signals_are_drawn_as_recorded_with_names_and_units():
+    gait = make_gait(4, 2, random_state=0)
+    tables = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
+    for x in tables:
+        x.attrs["units"] = list(gait.units)
+    tables[1].iloc[5:8, 0] = np.nan
+    steps = FrameWise(StandardScaler()), DenseSynchronizer(51), ActionModel()
+    pipe = make_pipeline(*steps).fit(tables)
+    given = {"features": ["vertical_force", "hip_flexion"], "xlabel": "% gait cycle"}
+    display = SynchronizationDisplay.from_estimator(pipe, tables, **given)
+    match = Match.from_estimator(pipe, tables)
+    for row, k in enumerate([3, 0]):
+        for drawn, x in zip(segments(display.before_[row]), tables, strict=True):
+            np.testing.assert_allclose(drawn[:, 1], x.iloc[:, k], atol=1e-12)
+        warped = match.warp(tables)[:, :, k]
+        np.testing.assert_allclose(ys(display.after_[row]), warped, atol=1e-12)
+        pattern = pipe[0].inverse_transform(pipe[1].pattern_)[:, k]
+        np.testing.assert_allclose(display.pattern_[row].get_ydata(), pattern)
+    labels = ["vertical_force\n(body weights)", "hip_flexion (deg)"]
+    assert [axis.get_ylabel() for axis in display.axes_[:4:2]] == labels
+    assert [axis.get_xlabel() for axis in display.axes_] == ["", "", *["% gait cycle"] * 3]
+    known = SynchronizationDisplay.from_predictions(tables, match, **given)
+    assert [axis.get_ylabel() for axis in known.axes_[:4:2]] == labels
+    assert known.axes_[-1].get_xlabel() == "% gait cycle"
+    # A model, and its band.
+    for band in ("points", "performances"):
+        model = ActionModelDisplay.from_estimator(pipe, tables, band=band, **given)
+        lower, upper = pipe[2].envelope(simultaneous=band == "performances")
+        (drawn,) = model.groups
+        for found, scaled in zip(drawn[:3], (pipe[2].mean_, lower, upper), strict=True):
+            expected = pipe[0].inverse_transform(scaled)[:, [3, 0]]
+            np.testing.assert_allclose(found, expected, atol=1e-9)
+        performances = pipe[0].inverse_transform(list(pipe[:2].transform(tables)))
+        np.testing.assert_allclose(drawn.performances, np.stack(performances)[:, :, [3, 0]])
+        assert [axis.get_ylabel() for axis in model.axes_] == labels
+        assert model.axes_[0].get_xlabel() == "% gait cycle"
+
+
+def test_groups_without_a_band_and_features_of_other_steps_are_unscaled(bunch):
+    cosines = DirectionCosines(bunch.skeleton)
+    scaled = make_pipeline(cosines, FrameWise(StandardScaler()), DenseSynchronizer(30))
+    scaled.fit(bunch.data)
+    display = SynchronizationDisplay.from_estimator(scaled, bunch.data, features=4)
+    unscaled = cosines.transform(bunch.data)
+    for drawn, x in zip(segments(display.before_[0]), unscaled, strict=True):
+        np.testing.assert_allclose(drawn[:, 1], x[:, 4], atol=1e-12)
+    # Features that are added after the scaler are as they are.
+    steps = *scaled[:2], TimingChannel(DenseSynchronizer(30)), ActionModel()
+    pipe = make_pipeline(*steps).fit(bunch.data)
+    last = pipe[-1].mean_.shape[1] - 1
+    model = ActionModelDisplay.from_estimator(pipe, bunch.data, features=[4, last], groups=GROUPS)
+    whole = pipe[:-1].transform(bunch.data)
+    np.testing.assert_allclose(model.groups[2].mean[:, 1], whole[8][:, last])
+    unscaled = pipe[1].inverse_transform(whole[8][:, :last])
+    np.testing.assert_allclose(model.groups[2].mean[:, 0], unscaled[:, 4])
+    assert np.isnan(model.groups[2].lower).all()
+    # A scaler of the frames of rows is none of their one feature.
+    rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
+    pipe = make_pipeline(StandardScaler(), DenseSynchronizer(20)).fit(rows)
+    display = SynchronizationDisplay.from_estimator(pipe, rows)
+    np.testing.assert_array_equal(ys(display.before_[0]), pipe[0].transform(rows))
