@@ -579,7 +579,7 @@ def check_coverage(coverage):
     return float(coverage)
 
 
-def match_of_times(times, n_sequences):
+def match_of_times(times, n_sequences) -> Match:
     """A match without distances, of given warps of so many performances."""
     if np.ndim(times) > 0 and len(times) != n_sequences:
         raise ValueError(
