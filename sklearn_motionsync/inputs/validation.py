@@ -93,8 +93,9 @@ class SequenceLevelMixin:
             same = X.names is getattr(self, "feature_names_in_", None)
             if same and X[0].shape[not on_rows] == self.n_features_in_:
                 return X
-        how = {"on_rows": on_rows, "finite": self._finite}
-        return check_performances(self, X, reset=False, level="sequence", **how)
+        return check_performances(
+            self, X, reset=False, level="sequence", on_rows=on_rows, finite=self._finite
+        )
 
     def _read_rows_in_fit(self):
         """Whether it was fitted on 2-D input; an error if it was not fitted."""
@@ -107,8 +108,9 @@ class SequenceLevelMixin:
 
     def _check_training_set(self, X, numbers=None):
         """Check the input of ``fit``: all performances, or some with their numbers."""
-        how = {"numbers": numbers, "finite": self._finite}
-        performances = check_performances(self, X, reset=True, level="sequence", **how)
+        performances = check_performances(
+            self, X, reset=True, level="sequence", numbers=numbers, finite=self._finite
+        )
         self._fitted_on_rows = performances.kind == "rows"
         if not self._fitted_on_rows:
             warn_of_clocks(performances, names_of_input(self))
@@ -182,8 +184,9 @@ def check_performances(
     """
     sequences = as_collection(X)
     if sequences is None:
-        how = {"reset": reset, "level": level, "on_rows": on_rows, "finite": finite}
-        rows = _check_rows(estimator, X, numbers=numbers, **how)
+        rows = _check_rows(
+            estimator, X, reset=reset, level=level, on_rows=on_rows, finite=finite, numbers=numbers
+        )
         rows.facts = [facts_of(X)]
         check_facts(estimator, rows.facts, rows.called, reset=reset, which=facts)
         return rows
@@ -194,10 +197,16 @@ def check_performances(
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    advice = getattr(estimator, "_on_gaps", None)
-    how = {"numbers": numbers, "dtype": dtype, "timed": timed, "advice": advice}
-    how |= {} if reset else {"names": names_of_input(estimator)}
-    out = check_members(sequences, finite=finite, training=reset, **how)
+    out = check_members(
+        sequences,
+        finite=finite,
+        training=reset,
+        numbers=numbers,
+        dtype=dtype,
+        names=None if reset else names_of_input(estimator),
+        timed=timed,
+        advice=getattr(estimator, "_on_gaps", None),
+    )
     width = out[0].shape[1]
     if not reset and width != estimator.n_features_in_:
         raise ValueError(
@@ -243,8 +252,8 @@ def check_transformed(estimator, X, names, *, finite=True):
     space = type(type(estimator).__name__, (BaseEstimator,), {})()
     space.n_features_in_ = len(names)
     sequences = as_collection(X)
-    some = X if sequences is None else next(iter(sequences), None)
-    named = column_names(some)
+    first = X if sequences is None else next(iter(sequences), None)
+    named = column_names(first)
     if named is not None and isinstance(named[0], str):
         space.feature_names_in_ = np.asarray(names, dtype=object)
     return check_performances(space, X, reset=False, level="posture", finite=finite)
@@ -260,11 +269,11 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
         return arrays[0]
     container = _get_output_config("transform", estimator)["dense"]
     if container == "pandas":
-        own, levels = performances.frames, performances.levels
+        labels_of_frames, levels = performances.frames, performances.levels
         if frames is not None:
-            own, levels = [frames] * len(arrays), (*levels[:-1], FRAME)
+            labels_of_frames, levels = [frames] * len(arrays), (*levels[:-1], FRAME)
         columns = estimator.get_feature_names_out() if columns is None else columns
-        return stack_frame(arrays, performances.labels, own, columns, levels)
+        return stack_frame(arrays, performances.labels, labels_of_frames, columns, levels)
     if container != "default":
         raise ValueError(
             f"{type(estimator).__name__} has no {container!r} output for a collection of "
@@ -286,8 +295,8 @@ def labels_of_input(X, reached):
     reached : Performances
         The input of a later step, maybe without labels.
     """
-    known = isinstance(X, Performances) or as_source(X) is not None
-    sequences = None if known else as_collection(X)
+    is_read = isinstance(X, Performances) or as_source(X) is not None
+    sequences = None if is_read else as_collection(X)
     if sequences is not None:
         labels, levels = labels_of(sequences)
         if labels != list(range(len(labels))) and len(labels) == len(reached):
@@ -327,10 +336,11 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
     names = getattr(estimator, "feature_names_in_", None)
     labels = index if index is not None else numbers
     advice = getattr(estimator, "_on_gaps", None)
-    how = {"allow_nan": finite == "allow-nan"} | ({"advice": advice} if advice else {})
-    check_finite(out, "Row", names, labels, **how)
-    ends = (np.fmax.reduce(out, axis=1, initial=0), -np.fmin.reduce(out, axis=1, initial=0))
-    size = np.maximum(*ends)
+    allow_nan = finite == "allow-nan"
+    check_finite(out, "Row", names, labels, allow_nan=allow_nan, advice=advice)
+    size = np.maximum(
+        np.fmax.reduce(out, axis=1, initial=0), -np.fmin.reduce(out, axis=1, initial=0)
+    )
     row = int(size.argmax())
     row_name = f"Row {row if numbers is None else numbers[row]}"
     check_magnitude(size[row], row_name, training=reset)
@@ -369,10 +379,10 @@ def _refuse_long_table(name, df):
 def _warn_of_exchanged_axes(performances):
     """Warn of performances (n_features, n_frames), by their first axis, which is not smooth."""
     n_frames, width = performances[0].shape
-    some = performances[:_ENOUGH]
-    if {len(x) for x in performances} != {n_frames} or not np.isfinite(np.stack(some)).all():
+    tested = performances[:_ENOUGH]
+    if {len(x) for x in performances} != {n_frames} or not np.isfinite(np.stack(tested)).all():
         return
-    if _smoothness(np.stack(some)) > _NO_TIME:
+    if _smoothness(np.stack(tested)) > _NO_TIME:
         warnings.warn(
             f"Every performance has {n_frames} frames of {width} features, and its features change "
             f"more smoothly than its frames.{_EXCHANGED}",
@@ -450,18 +460,25 @@ def read_source(estimator, source, on_rows):
         As for `check_performances`.
     """
     dtype = _dtype_of_maps(source)
-    start, part, size = 0, [], 0
+    start, portion, size = 0, [], 0
     for i in range(len(source)):
-        part.append(source[i])
-        size += getattr(part[-1], "size", 0) * _DOUBLE
-        if size < _BYTES and len(part) < MANY and i + 1 < len(source):
+        portion.append(source[i])
+        size += getattr(portion[-1], "size", 0) * _DOUBLE
+        if size < _BYTES and len(portion) < MANY and i + 1 < len(source):
             continue
         if dtype is None:
-            dtype = as_numbers(part[0], "Performance 0").dtype
-        how = {"on_rows": on_rows, "numbers": range(start, i + 1), "dtype": dtype}
-        how["finite"] = "allow-nan" if get_tags(estimator).input_tags.allow_nan else True
-        yield check_performances(estimator, part, reset=False, level="sequence", **how)
-        start, part, size = i + 1, [], 0
+            dtype = as_numbers(portion[0], "Performance 0").dtype
+        yield check_performances(
+            estimator,
+            portion,
+            reset=False,
+            level="sequence",
+            on_rows=on_rows,
+            finite="allow-nan" if get_tags(estimator).input_tags.allow_nan else True,
+            numbers=range(start, i + 1),
+            dtype=dtype,
+        )
+        start, portion, size = i + 1, [], 0
 
 
 def _dtype_of_maps(source):
