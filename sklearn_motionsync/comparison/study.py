@@ -51,10 +51,10 @@ class Study:
     def units(self, values):
         """Values (n_units, ...) of those of the performances; NaN where one of these is."""
         missing = np.isnan(values)
-        found = np.tensordot(self.maker, np.where(missing, 0.0, values), 1)
+        of_units = np.tensordot(self.maker, np.where(missing, 0.0, values), 1)
         if missing.any():
-            found[np.tensordot(self.maker != 0, missing, 1) > 0] = np.nan
-        return found
+            of_units[np.tensordot(self.maker != 0, missing, 1) > 0] = np.nan
+        return of_units
 
     @classmethod
     def of(cls, groups, covariate, people, paired, n):
@@ -132,28 +132,28 @@ class Study:
 
     def size(self, values, what):
         """Direction in words, size, and its interval of 95 %, of a value a unit; NaN is unknown."""
-        known = ~np.isnan(values)
-        values = values[known]
+        is_known = ~np.isnan(values)
+        values = values[is_known]
         if self.covariate is not None:
-            line = linregress(self.covariate[known], values)
+            line = linregress(self.covariate[is_known], values)
             return self._interval(line.slope, line.stderr, len(values) - 2, what, [])
         if self.groups is None:
             n = len(values)
             error = values.std(ddof=1) / np.sqrt(n)
             return self._interval(values.mean(), error, n - 1, what, self.labels)
-        parts = [values[self.groups[known] == k] for k in range(len(self.labels))]
-        means = [part.mean() for part in parts]
+        of_groups = [values[self.groups[is_known] == k] for k in range(len(self.labels))]
+        means = [x.mean() for x in of_groups]
         low, high = (0, 1) if len(means) == 2 else (first_smallest(means), first_largest(means))
-        a, b = parts[low], parts[high]
+        a, b = of_groups[low], of_groups[high]
         # Welch's test, for groups that vary differently.
         shares = np.array([x.var(ddof=1) / len(x) for x in (a, b)])
         degrees = np.sum(shares**2 / [len(a) - 1, len(b) - 1])
-        left = shares.sum() ** 2 / degrees if degrees > 0 else len(a) + len(b) - 2
+        freedom = shares.sum() ** 2 / degrees if degrees > 0 else len(a) + len(b) - 2
         labels = [self.labels[low], self.labels[high]]
-        return self._interval(b.mean() - a.mean(), np.sqrt(shares.sum()), left, what, labels)
+        return self._interval(b.mean() - a.mean(), np.sqrt(shares.sum()), freedom, what, labels)
 
-    def _interval(self, size, error, left, what, labels):
-        half = student.ppf(0.975, left) * error
+    def _interval(self, size, error, freedom, what, labels):
+        half = student.ppf(0.975, freedom) * error
         higher = "later" if what == "timing" else "above" if labels else "higher"
         lower = "earlier" if what == "timing" else "below" if labels else "lower"
         word = higher if size > 0 else lower
@@ -193,19 +193,20 @@ class GroupsOfPeople:
         if groups is None:
             codes, labels = np.zeros(n, dtype=int), [""]
         persons, _ = encode_groups(people, n, name="people")
-        found = []
+        makers, members_of, counts = [], [], []
         for k in range(len(labels)):
             means = _means(persons, codes == k)
             members = np.flatnonzero(means.any(axis=1))
-            found.append((means[members], members, int((codes == k).sum())))
-        makers, members, counts = map(list, zip(*found, strict=True))
-        return cls([str(label) for label in labels], makers, members, counts)
+            makers.append(means[members])
+            members_of.append(members)
+            counts.append(int((codes == k).sum()))
+        return cls([str(label) for label in labels], makers, members_of, counts)
 
     @property
     def are_pairs(self):
         """Whether all groups have the same people, and there are several."""
         return len(self.people) > 1 and all(
-            np.array_equal(some, self.people[0]) for some in self.people
+            np.array_equal(people, self.people[0]) for people in self.people
         )
 
     def describe(self, named):
@@ -220,11 +221,11 @@ class GroupsOfPeople:
 
     def means(self, values):
         """Means (n_people_k, ...) of people in each group, of the known values of performances."""
-        known = ~np.isnan(values)
+        is_known = ~np.isnan(values)
         means = []
         for maker in self.makers:
-            weights = np.tensordot(maker, known.astype(float), 1)
-            sums = np.tensordot(maker, np.where(known, values, 0.0), 1)
+            weights = np.tensordot(maker, is_known.astype(float), 1)
+            sums = np.tensordot(maker, np.where(is_known, values, 0.0), 1)
             means.append(np.where(weights > 0, sums / np.where(weights > 0, weights, 1), np.nan))
         return means
 
@@ -261,9 +262,9 @@ def band_of_mean(values, statistic, coverage):
 
 def _means(persons, some=None):
     """The matrix whose product with values is the mean of each person, (n_people, n_sequences)."""
-    own = persons == np.arange(persons.max() + 1)[:, np.newaxis]
-    own = own if some is None else own & some
-    return own / np.maximum(own.sum(axis=1, keepdims=True), 1)
+    belongs = persons == np.arange(persons.max() + 1)[:, np.newaxis]
+    belongs = belongs if some is None else belongs & some
+    return belongs / np.maximum(belongs.sum(axis=1, keepdims=True), 1)
 
 
 def _firsts(persons):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from numbers import Integral, Real
 
 import numpy as np
@@ -135,24 +136,29 @@ def synchronization_distances(
     >>> nearest.predict(synchronization_distances(new, known)).tolist()
     ['slow', 'fast', 'fast']
     """
-    settings = {
-        "n_frames": int(n_frames),
-        "velocity_smoothing": velocity_smoothing,
-        "max_offset": max_offset,
-        "smoothness": smoothness,
-        "max_rate": max_rate,
-    }
     reader = type("synchronization_distances", (SequenceLevelMixin, BaseEstimator), {})()
-    both = [check_performances(reader, X, reset=True, level="sequence")]
+    bases, moving = check_performances(reader, X, reset=True, level="sequence"), None
     if Y is not None:
-        on_rows = both[0].kind == "rows"
-        given = {"reset": False, "level": "sequence", "on_rows": on_rows}
-        both.append(check_performances(reader, Y, **given))
-    comparison = PairwiseDistance(cost, normalize=normalize, **settings)
-    features = [comparison.features(normalise_time(some, comparison.n_frames)) for some in both]
-    progress = Progress(reader, verbose)
+        on_rows = bases.kind == "rows"
+        moving = check_performances(reader, Y, reset=False, level="sequence", on_rows=on_rows)
+    comparison = PairwiseDistance(
+        cost,
+        normalize=normalize,
+        n_frames=int(n_frames),
+        velocity_smoothing=velocity_smoothing,
+        max_offset=max_offset,
+        smoothness=smoothness,
+        max_rate=max_rate,
+    )
     return pairwise_distances(
-        comparison, *features, symmetric=symmetric, n_jobs=n_jobs, progress=progress
+        comparison,
+        comparison.features(normalise_time(bases, comparison.n_frames)),
+        None
+        if moving is None
+        else comparison.features(normalise_time(moving, comparison.n_frames)),
+        symmetric=symmetric,
+        n_jobs=n_jobs,
+        progress=Progress(reader, verbose),
     )
 
 
@@ -179,23 +185,23 @@ def pairwise_distances(comparison, X, Y=None, *, symmetric=True, n_jobs=None, pr
     -------
     ndarray, shape (n_X, n_Y)
     """
-    shared = {"n_jobs": n_jobs, "progress": progress, "name": name}
-    there = _directed(comparison, X, X if Y is None else Y, **shared)
+    directed = partial(_directed, comparison, n_jobs=n_jobs, progress=progress, name=name)
+    there = directed(X, X if Y is None else Y)
     if not symmetric:
         return there
-    back = there if Y is None else _directed(comparison, Y, X, **shared)
+    back = there if Y is None else directed(Y, X)
     return there / 2 + back.T / 2
 
 
 def _directed(comparison, bases, moving, *, n_jobs, progress, name):
-    blocks = blocks_of_pairs(len(bases), len(moving))
-    portions = [(blocks[i : i + _PORTION_BLOCKS],) for i in range(0, len(blocks), _PORTION_BLOCKS)]
+    pairs = blocks_of_pairs(len(bases), len(moving))
+    portions = [(pairs[i : i + _PORTION_BLOCKS],) for i in range(0, len(pairs), _PORTION_BLOCKS)]
     stage = f"comparing {len(bases)} with {counted(len(moving), 'performance')}{name}"
-    jobs = {"n_jobs": n_jobs, "step": progress.stage(stage, len(portions))}
+    step = progress.stage(stage, len(portions))
     out = np.empty((len(bases), len(moving)))
     common = (SharedArgument((comparison, bases, moving)),)
-    for found in run(_blocks, portions, common=common, **jobs):
-        for (i, j), distances in found:
+    for blocks in run(_blocks, portions, common=common, n_jobs=n_jobs, step=step):
+        for (i, j), distances in blocks:
             out[i, j] = distances
     return out
 

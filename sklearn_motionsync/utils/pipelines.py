@@ -135,8 +135,9 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     TypeError
         If no method accepts one of the params.
     """
-    found = find_synchronizer(estimator) if kind is None else find_step(estimator, kind)
-    before, synchronizer = found
+    before, synchronizer = (
+        find_synchronizer(estimator) if kind is None else find_step(estimator, kind)
+    )
     check_is_fitted(synchronizer)
     also = [getattr(synchronizer, name) for name in uses]
     features = transform_through(before, X, params, caller, hint=hint, also=also)
@@ -190,22 +191,24 @@ def accepted_params(method, params):
 
     A synchronizer that was fitted without key-frames accepts none.
     """
-    given = {name: value for name, value in params.items() if value is not None}
+    values = {name: value for name, value in params.items() if value is not None}
     owner = getattr(method, "__self__", None)
     if getattr(_unwrapped(owner), "keyframes_", owner) is None:
-        given = {name: value for name, value in given.items() if name not in _OF_KEYFRAMES}
+        values = {name: value for name, value in values.items() if name not in _OF_KEYFRAMES}
     if isinstance(owner, FeatureUnion):
         # By its signature it accepts any, and passes on those that its transformers accept.
-        parts = [accepted_params(part.transform, given) for part in union_transformers(owner)]
-        return {name: value for part in parts for name, value in part.items()}
+        accepted_by_each = [
+            accepted_params(each.transform, values) for each in union_transformers(owner)
+        ]
+        return {name: value for each in accepted_by_each for name, value in each.items()}
     # A wrapper of a synchronizer passes on those that the synchronizer accepts.
     method = getattr(_unwrapped(owner), method.__name__, method)
     # The first one is X.
     _, *accepted = inspect.signature(method).parameters.values()
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
-        return given
+        return values
     names = {parameter.name for parameter in accepted}
-    return {name: value for name, value in given.items() if name in names}
+    return {name: value for name, value in values.items() if name in names}
 
 
 def find_step(estimator, kind):
@@ -277,7 +280,7 @@ def steps_to_fit(estimator, prefix=""):
     """
     if isinstance(estimator, Pipeline):
         steps = _named_steps(estimator)
-        return [found for name, step in steps for found in steps_to_fit(step, f"{prefix}{name}__")]
+        return [each for name, step in steps for each in steps_to_fit(step, f"{prefix}{name}__")]
     inner = getattr(estimator, "estimator", None)
     return [(prefix, estimator)] if inner is None else steps_to_fit(inner, prefix)
 
@@ -287,9 +290,9 @@ def index_of_pattern(synchronizer, performances):
     index = synchronizer.pattern_index_
     if index is None or index >= len(performances):
         return None
-    own = synchronizer.normalize(performances.take([index]))[0]
+    pattern = synchronizer.normalize(performances.take([index]))[0]
     # The gaps of the pattern are filled.
-    same = (own == synchronizer.pattern_) | np.isnan(own)
+    same = (pattern == synchronizer.pattern_) | np.isnan(pattern)
     return index if same.all() else None
 
 
@@ -310,14 +313,14 @@ def _unwrapped(step):
 
 
 def _find(estimator, fits, name):
-    found = _search(estimator, fits)
-    if found is None:
+    located = _search(estimator, fits)
+    if located is None:
         estimator = _fitted_estimator(estimator)
         names = [type(step).__name__ for step in flat_steps(estimator)]
         raise ValueError(
             f"There is no {name} in {type(estimator).__name__}; its steps are {names}."
         )
-    return found
+    return located
 
 
 def _search(estimator, fits):
@@ -328,9 +331,9 @@ def _search(estimator, fits):
             ((None, step) for step in (_unwrapped(estimator), estimator) if fits(step)), None
         )
     for i, (name, step) in enumerate(estimator.steps):
-        found = _search(step, fits)
-        if found is not None:
-            inner, fitting = found
+        located = _search(step, fits)
+        if located is not None:
+            inner, fitting = located
             before = estimator.steps[:i] + ([] if inner is None else [(name, inner)])
             return (Pipeline(before) if before else None), fitting
     return None
@@ -342,8 +345,8 @@ def takes_gaps(transformer):
         steps = [step for _, step in transformer.steps if step not in (None, "passthrough")]
         return bool(steps) and takes_gaps(steps[0])
     if isinstance(transformer, FeatureUnion):
-        parts = [part for _, part in transformer.transformer_list if part != "drop"]
-        return all(part == "passthrough" or takes_gaps(part) for part in parts)
+        transformers = [each for _, each in transformer.transformer_list if each != "drop"]
+        return all(each == "passthrough" or takes_gaps(each) for each in transformers)
     if not hasattr(transformer, "__sklearn_tags__"):
         return False
     tags = get_tags(transformer)
