@@ -551,8 +551,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             If the match is on another clock, or does not tell how sure it is (`Match.interval`).
         """
         self._check_groups_seen()
-        kept = self._stream.kept.astype(np.float64)
-        half_width = mean_band(kept, self.groups_, self.coverage, random_state)
+        training = self._stream.kept.astype(np.float64)
+        half_width = mean_band(training, self.groups_, self.coverage, random_state)
         if match is not None:
             if match.times.shape[1] != self.n_frames_:
                 raise ValueError(
@@ -575,8 +575,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             The half-width of the simultaneous band.
         """
         self._check_groups_seen()
-        kept = self._stream.kept.astype(np.float64)
-        return simultaneous_factor(kept, self.groups_, self.coverage)
+        training = self._stream.kept.astype(np.float64)
+        return simultaneous_factor(training, self.groups_, self.coverage)
 
     def sample(
         self, n: int = 1, frame: int | None = None, random_state: RandomState = None
@@ -613,14 +613,15 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         if not isinstance(n, Integral) or n < 1:
             raise ValueError(f"n must be a whole number of samples, at least 1; got {n!r}.")
         random_state = check_random_state(random_state)
-        moments = self.mean_, self.variance_, self.deviations_
+        mean, variance, deviations = self.mean_, self.variance_, self.deviations_
         if frame is not None:
-            frame = self._check_frame(frame)
-            mean, variance, deviations = moments
-            at_frame = mean[frame], variance[frame], deviations[:, frame]
-            return sample_postures(*at_frame, n, self.n_std, random_state)
-        inside = self._neighbours.dissimilarity, self.threshold_
-        samples = sample_performances(*moments, n, *inside, random_state)
+            k = self._check_frame(frame)
+            mean, variance, deviations = mean[k], variance[k], deviations[:, k]
+            return sample_postures(mean, variance, deviations, n, self.n_std, random_state)
+        dissimilarity, limit = self._neighbours.dissimilarity, self.threshold_
+        samples = sample_performances(
+            mean, variance, deviations, n, dissimilarity, limit, random_state
+        )
         return samples[:, :, 0] if self._fitted_on_rows else samples
 
     # -- helpers ------------------------------------------------------------------------------
@@ -651,16 +652,16 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         if stream.n_groups < 2 or unseen:
             return learnt
         if stream.kept is before.kept:
-            neighbours, known = self._neighbours, self._kept_dissimilarities
+            neighbours, compared_before = self._neighbours, self._kept_dissimilarities
         else:
-            kept = stream.kept.astype(np.float64)
-            variance = predictive_variance(kept, stream.groups)
+            training = stream.kept.astype(np.float64)
+            variance = predictive_variance(training, stream.groups)
             learnt["predictive_variance_"] = variance.astype(dtype)
-            weights = learn_weights(fill_with_mean(kept, stream.mean), stream.groups)
-            neighbours = Neighbours(kept, stream.groups, mean=stream.mean, weights=weights)
-            known = neighbours.dissimilarity(before.kept, before.groups)
+            weights = learn_weights(fill_with_mean(training, stream.mean), stream.groups)
+            neighbours = Neighbours(training, stream.groups, mean=stream.mean, weights=weights)
+            compared_before = neighbours.dissimilarity(before.kept, before.groups)
         dissimilarities = neighbours.dissimilarity(performances, codes)
-        compared = np.concatenate([known, dissimilarities])
+        compared = np.concatenate([compared_before, dissimilarities])
         moments = stream.dropped + log_moments(compared)
         dropped = stream.dropped + log_moments(compared[~is_kept])
         return learnt | {
@@ -676,9 +677,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         """What dissimilarities are to: the training performances, or those of a person."""
         if reference is None:
             return self._neighbours
-        own = np.stack(self.check_performances(reference)).astype(np.float64)
-        kept, stream = self._stream.kept.astype(np.float64), self._stream
-        return PersonalReference(kept, stream.groups, stream.mean, own)
+        of_person = np.stack(self.check_performances(reference)).astype(np.float64)
+        training, stream = self._stream.kept.astype(np.float64), self._stream
+        return PersonalReference(training, stream.groups, stream.mean, of_person)
 
     def _describe_unseen(self, stream):
         """A text about a value that the performances of fewer than two groups show; or none."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -133,18 +134,19 @@ def find_departures(
     is_number = isinstance(limit, Real) and not isinstance(limit, bool)
     if limit is not None and not (is_number and 0 < limit < np.inf):
         raise ValueError(f"limit must be a number above 0, or None; got {limit!r}.")
-    caller, how = "find_departures", (features, limit, reference)
+    caller = "find_departures"
     models = models_of_classes(estimator, X, params, caller)
-    if models is None:
-        return _departures(estimator, X, params, caller, *how)
-    # Params are those of the steps before a classifier; its models take none.
-    parts = [
-        _departures(part.estimator, part.performances, {}, caller, *how, part) for part in models
-    ]
-    order = np.concatenate(
-        [part.indices[t.pop("index")] for part, t in zip(models, parts, strict=True)]
+    table_of = partial(
+        _departures, caller=caller, features=features, limit=limit, reference=reference
     )
-    table = pd.concat(parts).iloc[np.argsort(order, kind="stable")]
+    if models is None:
+        return table_of(estimator, X, params)
+    # Params are those of the steps before a classifier; its models take none.
+    tables = [table_of(each.estimator, each.performances, {}, part=each) for each in models]
+    order = np.concatenate(
+        [each.indices[t.pop("index")] for each, t in zip(models, tables, strict=True)]
+    )
+    table = pd.concat(tables).iloc[np.argsort(order, kind="stable")]
     return table.reset_index(drop=True).infer_objects()
 
 
@@ -168,10 +170,10 @@ def _departures(estimator, X, params, caller, features, limit, reference, part=N
     columns["timing"] = np.zeros(len(rows), dtype=bool)
     if rows and judged.match is not None and judged.match.intervals is not None:
         fields = "performance", "feature", "first", "last", "peak", "deviation"
-        found = Runs(*(np.array([getattr(row, name) for row in rows]) for name in fields))
+        faults = Runs(*(np.array([getattr(row, name) for row in rows]) for name in fields))
         reach = (view.model.n_std if limit is None else limit) * judged.std
-        bounds = judged.mean - reach, judged.mean + reach
-        columns["timing"] = explained_by_timing(found, judged.curves, *bounds, judged.match)
+        lower, upper = judged.mean - reach, judged.mean + reach
+        columns["timing"] = explained_by_timing(faults, judged.curves, lower, upper, judged.match)
     return pd.DataFrame(columns).infer_objects()
 
 
@@ -294,8 +296,8 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     -------
     Judged
     """
-    how = {"features": features, "postures": features is None}
-    view = view_of(estimator, X, params, caller, **how)
+    postures = features is None
+    view = view_of(estimator, X, params, caller, features=features, postures=postures)
     sought = range(len(view.given)) if only is None else [only(len(view.given))]
     names, chosen = view.names, np.arange(len(view.names))
     if features is not None:
@@ -307,12 +309,14 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     limbs = limbs_of(before, names) if features is None else None
     space = FaultSpace([names[i] for i in chosen], limbs)
     training, groups = view.training[..., chosen].astype(np.float64), view.model.groups_
-    mean, std, own = view.model.mean_[:, chosen], view.predicted[:, chosen], None
+    mean, std, of_person = view.model.mean_[:, chosen], view.predicted[:, chosen], None
     if reference is not None:
-        given = view_of(estimator, reference, {}, caller, **how).whole[..., chosen]
-        own = fill_with_mean(given.astype(np.float64), mean)
-        mean, variance = expected_performance(training, groups, own)
-        std = np.sqrt(variance + view.residual_variance[chosen] * (1 + 1 / len(own)))
+        of_person = view_of(
+            estimator, reference, {}, caller, features=features, postures=postures
+        ).whole[..., chosen]
+        of_person = fill_with_mean(of_person.astype(np.float64), mean)
+        mean, variance = expected_performance(training, groups, of_person)
+        std = np.sqrt(variance + view.residual_variance[chosen] * (1 + 1 / len(of_person)))
     curves, left_out = view.whole[..., chosen], view.residual_variance[chosen]
     filled = fill_with_mean(curves.astype(np.float64), mean)
     match = _match_of(estimator, X, params, caller)
@@ -331,25 +335,25 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
             return space.convert(performances)[..., :width]
 
         of_reference = None
-        if own is not None:
+        if of_person is not None:
             times = _match_of(estimator, reference, {}, caller).times
-            of_reference = to_space(unwarped(own, times))
+            of_reference = to_space(unwarped(of_person, times))
         if width:
             examples = with_residuals(padded[..., chosen], whose, left_out)
             linear = to_space(examples), whose, of_reference
             later = to_space(unwarped(filled, match.times))
-    known = space.convert(with_residuals(training, groups, left_out))
+    converted = space.convert(with_residuals(training, groups, left_out))
     finder = FaultFinder(
-        known, groups, space.parts, None if own is None else space.convert(own),
+        converted, groups, space.parts, None if of_person is None else space.convert(of_person),
         coverage=view.model.coverage,
-        floor=space.outside(known),
+        floor=space.outside(converted),
         linear=linear,
     )  # fmt: skip
     pairs = enumerate(zip(space.convert(filled), later, strict=True))
-    faults = [finder.find(*pair) if i in sought else [] for i, pair in pairs]
+    faults = [finder.find(x, in_time) if i in sought else [] for i, (x, in_time) in pairs]
     scores = (curves - mean) / std
-    limits = finder.usual_score, finder.rare_score, view.model.simultaneous_factor()
-    return Judged(view, space, curves, mean, std, scores, faults, *limits, match)
+    usual, rare, limit = finder.usual_score, finder.rare_score, view.model.simultaneous_factor()
+    return Judged(view, space, curves, mean, std, scores, faults, usual, rare, limit, match)
 
 
 class FaultSpace:
@@ -366,7 +370,7 @@ class FaultSpace:
     def __init__(self, names, limbs):
         self.names, self.limbs = names, limbs
         self.parts = []
-        others = list(range(len(names)))
+        remaining = list(range(len(names)))
         if limbs is not None:
             skeleton, start = limbs.cosines.skeleton, limbs.columns.start
             first, n_dims = int(skeleton.has_height), skeleton.n_dims
@@ -374,11 +378,11 @@ class FaultSpace:
             for k, limb in enumerate(skeleton.limbs):
                 spans.append((limb, list(range(first + n_dims * k, first + n_dims * (k + 1)))))
             for limb, columns in spans:
-                own = [start + k for k in columns]
-                self.parts.append(Part(limb, columns, own, part_of_limb(limb)))
-            others = [k for k in others if not start <= k < limbs.columns.stop]
-        self._others, n_cosines = others, len(names) - len(others)
-        self.parts += [Part(names[k], [n_cosines + j], [k], None) for j, k in enumerate(others)]
+                in_view = [start + k for k in columns]
+                self.parts.append(Part(limb, columns, in_view, part_of_limb(limb)))
+            remaining = [k for k in remaining if not start <= k < limbs.columns.stop]
+        self._others, n_cosines = remaining, len(names) - len(remaining)
+        self.parts += [Part(names[k], [n_cosines + j], [k], None) for j, k in enumerate(remaining)]
 
     def convert(self, performances):
         """Performances (n, P, n_features) of the view, without gaps: (n, P, n_columns)."""
@@ -446,8 +450,8 @@ def around_peak(scores, peak):
 def unwarped(performances, times):
     """Performances (n, P, n_features) on the clock, in linear time, by their times (n, P)."""
     frames, out = np.arange(performances.shape[1]), np.empty_like(performances)
-    for x, own, unwound in zip(performances, times, out, strict=True):
-        at = np.interp(frames, own, frames)
+    for x, own_times, unwound in zip(performances, times, out, strict=True):
+        at = np.interp(frames, own_times, frames)
         below = np.minimum(at.astype(np.intp), len(frames) - 2)
         weight = (at - below)[:, np.newaxis]
         unwound[:] = x[below] * (1 - weight) + x[below + 1] * weight
@@ -546,10 +550,10 @@ def explained_by_timing(found, curves, lower, upper, match):
     frames, explained = np.arange(n_frames), np.empty(len(found.first), dtype=bool)
     starts, ends = np.minimum(spans[:, 0], frames), np.maximum(spans[:, 1], frames + 1)
     for k, (i, feature) in enumerate(zip(found.performance, found.feature, strict=True)):
-        own, run = curves[i, :, feature], frames[found.first[k] : found.last[k] + 1]
+        curve, run = curves[i, :, feature], frames[found.first[k] : found.last[k] + 1]
         # A fault may last over a gap, in which nothing was seen.
-        run = run[~np.isnan(own[run])]
-        seen = [own[starts[i, p] : ends[i, p]] for p in run]
+        run = run[~np.isnan(curve[run])]
+        seen = [curve[starts[i, p] : ends[i, p]] for p in run]
         low, high = (np.array([extreme(x) for x in seen]) for extreme in (np.nanmin, np.nanmax))
         explained[k] = np.all((low <= upper[run, feature]) & (high >= lower[run, feature]))
     return explained

@@ -226,8 +226,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
                 pipeline.fit(X, y, **fit_params)
             also = {name.rpartition("__")[2]: value for name, value in params.items()}
             takers = [getattr(step, "match", step.transform) for step in flat_steps(pipeline)[:-1]]
-            taken = [accepted_params(taker, also) for taker in takers]
-            also = {name: value for params in taken for name, value in params.items()}
+            accepted = [accepted_params(taker, also) for taker in takers]
+            also = {name: value for params in accepted for name, value in params.items()}
             tests = self._learn(pipeline, X, also, groups)
         self.estimator_, self._tests = pipeline, tests
         self.borders_ = {
@@ -339,11 +339,11 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             those that are too short or too weak. ``score``: up to 1 is accepted. ``reason`` of a
             rejection, such as "too long, too weak"; empty if the performance is accepted.
         """
-        found = self._test(X, reference, params, "report")
-        labels, levels = labels_of_input(X, found.performances)
-        table = pd.DataFrame(found.statistics, index=index_of(labels, levels[:-1]))
-        table["score"] = found.scores
-        table["reason"] = _reasons(found)
+        judged = self._test(X, reference, params, "report")
+        labels, levels = labels_of_input(X, judged.performances)
+        table = pd.DataFrame(judged.statistics, index=index_of(labels, levels[:-1]))
+        table["score"] = judged.scores
+        table["reason"] = _reasons(judged)
         return table
 
     def get_metadata_routing(self):
@@ -413,21 +413,24 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         exchanges = {"reversal": _reversed}
         cosines = names_of_cosines(whole, names)
         if self.sides is not False and cosines is not None:
-            arms = [limb for part in ("left arm", "right arm") for limb in PARTS[part]]
+            arms = [limb for arm in ("left arm", "right arm") for limb in PARTS[arm]]
             for name, limbs in (("mirror", None), ("arms", arms)):
                 exchange = exchange_of_sides(cosines, limbs)
                 if exchange is not None:
-                    exchanges[name] = partial(_exchanged, *exchange)
+                    columns, signs = exchange
+                    exchanges[name] = partial(_exchanged, columns, signs)
         if self.sides is True and len(exchanges) == 1:
             raise ValueError(
                 "sides=True needs limbs with a left and a right: put a DirectionCosines before the "
                 f"synchronizer. The features are {', '.join(names[:4])}, ..."
             )
         filled = fill_with_mean(whole, mean)
-        found = {name: Contrast(filled, e, codes) for name, e in exchanges.items()}
+        contrasts = {name: Contrast(filled, e, codes) for name, e in exchanges.items()}
         always = () if self.sides == "auto" else ("mirror", "arms")
         return {
-            name: c for name, c in found.items() if c.is_clear or (name in always and c.middle > 0)
+            name: c
+            for name, c in contrasts.items()
+            if c.is_clear or (name in always and c.middle > 0)
         }
 
     def _test(self, X, reference, params, method):
@@ -437,10 +440,12 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         try:
             reached = route_to_synchronizer(self.estimator_, X, params, caller, uses=("transform",))
             curves = curves_of(self.estimator_, X, params, caller)
-            own = None
+            of_person = None
             if reference is not None:
-                own = curves_of(self.estimator_, reference, {}, caller).whole[..., tests.columns]
-                own = fill_with_mean(own, tests.aligned.mean_)
+                of_person = curves_of(self.estimator_, reference, {}, caller).whole[
+                    ..., tests.columns
+                ]
+                of_person = fill_with_mean(of_person, tests.aligned.mean_)
         except MissingMetadata as error:
             reason, name, _ = error.args
             raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error
@@ -454,16 +459,16 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
 
         model = tests.aligned
         compare("movement", model.dissimilarity(whole), model.dissimilarities_, model.threshold_)
-        if own is not None:
+        if of_person is not None:
             stream = tests.stream
-            kept, own = (x.astype(np.float64) for x in (stream.kept, own))
-            person = PersonalReference(kept, stream.groups, stream.mean, own)
-            known = np.isfinite(person.held_out)
-            held_out, found = person.held_out[known], person.dissimilarity(whole)
-            compare("own", found, held_out, person.limit(model.coverage))
-            held = {name: values[known] for name, values in tests.kept_tails.items()}
+            training, of_person = (x.astype(np.float64) for x in (stream.kept, of_person))
+            person = PersonalReference(training, stream.groups, stream.mean, of_person)
+            is_compared = np.isfinite(person.held_out)
+            held_out, dissimilarity = person.held_out[is_compared], person.dissimilarity(whole)
+            compare("own", dissimilarity, held_out, person.limit(model.coverage))
+            held = {name: values[is_compared] for name, values in tests.kept_tails.items()}
             held["own"] = log_tails(standardised_logs(held_out), len(held_out))
-            acceptance = Acceptance(held, stream.groups[known], self.coverage, main="own")
+            acceptance = Acceptance(held, stream.groups[is_compared], self.coverage, main="own")
         model = tests.unaligned
         compare("course", model.dissimilarity(on_clock), model.dissimilarities_, model.threshold_)
         measures = {
@@ -476,11 +481,13 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             tails[name] = log_tails(tests.end * statistics[name], n, two_sided=True)
         scores = acceptance.scores(tails)
         # A person may differ from others, but not from the reference.
-        alone = [values for name, values in statistics.items() if own is None or name != "movement"]
+        alone = [
+            values for name, values in statistics.items() if of_person is None or name != "movement"
+        ]
         far = np.abs(alone).max(axis=0) / _ALONE
         filled = fill_with_mean(whole, tests.aligned.mean_)
         for name, contrast in tests.contrasts.items():
-            if own is not None and contrast.standardize(own).mean() > 1:
+            if of_person is not None and contrast.standardize(of_person).mean() > 1:
                 # The person does it the other way.
                 continue
             statistics[name] = contrast.standardize(filled)

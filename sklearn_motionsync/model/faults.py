@@ -125,8 +125,8 @@ def expected_performance(performances, groups, reference=None):
     within, n = within_variance(performances, groups), len(reference)
     if n > 1:
         # A person whose own performances differ more than those of others do.
-        own = reference.var(axis=0, ddof=1).mean(axis=0) / within.mean(axis=0)
-        within = within * np.maximum((_PRIOR_COUNT + (n - 1) * own) / (_PRIOR_COUNT + n - 1), 1)
+        ratio = reference.var(axis=0, ddof=1).mean(axis=0) / within.mean(axis=0)
+        within = within * np.maximum((_PRIOR_COUNT + (n - 1) * ratio) / (_PRIOR_COUNT + n - 1), 1)
     between = np.maximum(variance - within, _LEAST_BETWEEN * within)
     weight = between / (between + within / n)
     return mean + weight * (reference.mean(axis=0) - mean), within * (1 + weight / n)
@@ -168,8 +168,8 @@ class Expectation:
         self._alone = 1 / np.maximum(norms, _SMALLEST * max(norms.max(initial=0), _SMALLEST))
         self._inverse = []
         for _, columns, blocks in self._alike:
-            own, other = self._windows[:, :, columns], weighted[:, :, columns]
-            products = np.einsum("wpki,wpkj->wkij", own, other, optimize=True) * blocks
+            windows_of_parts, other = self._windows[:, :, columns], weighted[:, :, columns]
+            products = np.einsum("wpki,wpkj->wkij", windows_of_parts, other, optimize=True) * blocks
             trace = np.trace(products, axis1=2, axis2=3)[..., np.newaxis, np.newaxis]
             eye = np.eye(columns.shape[1])
             self._inverse.append(np.linalg.inv(products + 1e-9 * (trace + _SMALLEST) * eye))
@@ -199,9 +199,9 @@ class Expectation:
         sums = np.einsum("wpf,pf->wf", self._windows, weighed, optimize=True)
         gains, changes = np.empty((len(sums), len(self.parts))), np.empty_like(sums)
         for (of, columns, _), inverse in zip(self._alike, self._inverse, strict=True):
-            own = sums[:, columns]
-            change = np.einsum("wkij,wkj->wki", inverse, own)
-            gains[:, of] = (own * change).sum(axis=2)
+            sums_of_parts = sums[:, columns]
+            change = np.einsum("wkij,wkj->wki", inverse, sums_of_parts)
+            gains[:, of] = (sums_of_parts * change).sum(axis=2)
             changes[:, columns] = change
         return gains, changes
 
@@ -238,8 +238,8 @@ class Expectation:
         out = np.empty(len(self.parts))
         weighted = self.over_time @ x
         for of, columns, blocks in self._alike:
-            own, other = x[:, columns], weighted[:, columns]
-            out[of] = np.einsum("pki,pkj,kij->k", own, other, blocks, optimize=True)
+            x_of_parts, other = x[:, columns], weighted[:, columns]
+            out[of] = np.einsum("pki,pkj,kij->k", x_of_parts, other, blocks, optimize=True)
         return out
 
 
@@ -272,18 +272,20 @@ class FaultFinder:
         self._windows, self._spans = windows_of(n_frames)
         largest = int(_LARGEST_LAG * n_frames)
         self._lags = np.array([lag for lag in range(-largest, largest + 1) if lag])
-        given = reference if reference is None else self._coarse(reference)
-        on_clock = self._coarse(performances), groups, given
-        self._clock = _Learnt(*on_clock, parts, floor)
+        coarse_reference = None if reference is None else self._coarse(reference)
+        self._clock = _Learnt(self._coarse(performances), groups, coarse_reference, parts, floor)
         self._linear = None
         if linear is not None:
-            of_linear = self._coarse(linear[0]), linear[1]
-            given = None if reference is None else self._coarse(linear[2])
-            columns = linear[0].shape[2]
-            known = [part for part in parts if max(part.columns) < columns]
-            self._known = np.array([k for k, part in enumerate(parts) if part in known])
+            in_time, groups_in_time, reference_in_time = linear
+            if reference_in_time is not None:
+                reference_in_time = self._coarse(reference_in_time)
+            columns = in_time.shape[2]
+            known_parts = [part for part in parts if max(part.columns) < columns]
+            self._known = np.array([k for k, part in enumerate(parts) if part in known_parts])
             floor = np.broadcast_to(floor, performances.shape[2:])[:columns]
-            self._linear = _Learnt(*of_linear, given, known, floor)
+            self._linear = _Learnt(
+                self._coarse(in_time), groups_in_time, reference_in_time, known_parts, floor
+            )
         self._calibrate(coverage)
         self._expected = self._prepared(self._clock.expectation)
         if self._linear is not None:
@@ -303,25 +305,25 @@ class FaultFinder:
         -------
         list of FoundFault
         """
-        rest = self._coarse(performance[np.newaxis])[0] - self._expected.mean
+        deviations = self._coarse(performance[np.newaxis])[0] - self._expected.mean
         later = None
         if self._linear is not None:
             later = self._coarse(in_linear_time[np.newaxis])[0] - self._late.mean
         faults, is_open = [], np.ones(len(self.parts), dtype=bool)
         for _ in range(_MOST_STEPS):
-            fault, effect = self._largest(rest, later, is_open)
+            fault, effect = self._largest(deviations, later, is_open)
             if fault is None:
                 break
             columns = self.parts[fault.part].columns
             if fault.kind == "off":
-                rest[:, columns] -= effect
+                deviations[:, columns] -= effect
             else:
                 # The whole course of the part is explained.
                 is_open[fault.part] = False
-                rest[:, columns] = 0
+                deviations[:, columns] = 0
                 if later is not None and max(columns) < later.shape[1]:
                     later[:, columns] = 0
-            if not any(_overlap(fault, known) for known in faults):
+            if not any(_overlap(fault, earlier) for earlier in faults):
                 faults.append(fault)
             if len(faults) == _MOST_FAULTS:
                 break
@@ -376,9 +378,9 @@ class FaultFinder:
         gains, changes = expectation.of_windows(weighed)
         lag_gains, lags = expectation.of_lags(weighed)
         alone = expectation.of_windows_alone(deviations)
-        of_ratio = expectation.of_amplitude(weighed)
+        ratio_gains, ratios = expectation.of_amplitude(weighed)
         still = expectation.of_standing_still(weighed)
-        return _Evidence(gains, changes, lag_gains, lags, *of_ratio, alone, still)
+        return _Evidence(gains, changes, lag_gains, lags, ratio_gains, ratios, alone, still)
 
     def _total(self, evidence, of_late):
         """The evidence that something is wrong with each part."""
@@ -469,36 +471,42 @@ class _Learnt:
             n_reference = 0
         self._expected, self.indices = {}, []
         for i in range(len(performances)):
-            own = np.flatnonzero(codes == codes[i])
-            own = own[own != i][:n_reference]
-            if n_reference and not len(own):
+            same_group = np.flatnonzero(codes == codes[i])
+            same_group = same_group[same_group != i][:n_reference]
+            if n_reference and not len(same_group):
                 continue
-            others = codes != codes[i]
-            if others.sum() < 2:
-                others[:] = True
+            is_other = codes != codes[i]
+            if is_other.sum() < 2:
+                is_other[:] = True
             key = (codes[i], i) if n_reference else codes[i]
             if key not in self._expected:
-                given = performances[own] if n_reference else None
-                mean, variance = expected_performance(performances[others], codes[others], given)
+                of_group = performances[same_group] if n_reference else None
+                mean, variance = expected_performance(
+                    performances[is_other], codes[is_other], of_group
+                )
                 self._expected[key] = mean, self._raised(variance, floor)
             self.indices.append((i, key, codes[i]))
         deviations = [performances[i] - self._expected[key][0] for i, key, _ in self.indices]
         scales = [1 / np.sqrt(self._expected[key][1]) for _, key, _ in self.indices]
         self._scores = np.array(deviations) * np.array(scales)
         mean, variance = expected_performance(performances, codes, reference)
-        variance, whole = self._raised(variance, floor), precisions(self._scores)
-        self.expectation = Expectation(mean, variance, *whole, parts)
+        variance, (over_time, between) = self._raised(variance, floor), precisions(self._scores)
+        self.expectation = Expectation(mean, variance, over_time, between, parts)
 
     def left_out(self):
         """Each performance that was left out: index, expectation by others, and deviations."""
-        known, before = {}, None
+        inverses, before = {}, None
         for i, key, group in self.indices:
-            if group not in known:
-                others = np.array([other != group for _, _, other in self.indices])
-                known = {group: precisions(self._scores[others] if others.any() else self._scores)}
+            if group not in inverses:
+                is_other = np.array([other != group for _, _, other in self.indices])
+                inverses = {
+                    group: precisions(self._scores[is_other] if is_other.any() else self._scores)
+                }
             mean, variance = self._expected[key]
             if key != before:
-                expectation, before = Expectation(mean, variance, *known[group], self._parts), key
+                over_time, between = inverses[group]
+                expectation = Expectation(mean, variance, over_time, between, self._parts)
+                before = key
             yield i, expectation, self._performances[i] - mean
 
     def _raised(self, variance, floor):

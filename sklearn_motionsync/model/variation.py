@@ -101,8 +101,8 @@ def within_variance(performances, groups):
     variance = np.maximum(_shrink(squares, freedom + 1, _SHRINKAGE), _floor(performances))
     unknown = ~freedom.any(axis=0)
     if unknown.any():
-        some = performances[..., unknown]
-        variance[:, unknown] = _WITHIN_SHARE * predictive_variance(some, codes)
+        unseen = performances[..., unknown]
+        variance[:, unknown] = _WITHIN_SHARE * predictive_variance(unseen, codes)
     return variance
 
 
@@ -135,11 +135,12 @@ def simultaneous_factor(performances, groups, coverage):
     largest = np.empty(len(performances))
     for group in range(codes.max() + 1):
         out = codes == group
-        others = performances[~out], codes[~out]
-        if len(others[0]) == 1:
+        compared = ~out
+        if compared.sum() == 1:
             # A single performance has no variance: that of both takes its place.
-            others, prior = (performances, codes), _VAGUE_VARIANCE
-        z = (performances[out] - mean[out]) / np.sqrt(predictive_variance(*others))
+            compared, prior = slice(None), _VAGUE_VARIANCE
+        variance = predictive_variance(performances[compared], codes[compared])
+        z = (performances[out] - mean[out]) / np.sqrt(variance)
         # Of what was seen.
         largest[out] = np.fmax.reduce(np.abs(z), axis=(1, 2), initial=0)
     logs = np.log(np.maximum(largest, _LEAST))
@@ -241,11 +242,11 @@ def _shrink(squares, n, shrinkage=_SHRINKAGE):
 
     Where one is not known (NaN) it is that mean.
     """
-    known = ~np.isnan(squares)
-    if known.all():
+    is_known = ~np.isnan(squares)
+    if is_known.all():
         return ((n - 1) * squares + shrinkage * squares.mean(axis=0)) / (n - 1 + shrinkage)
-    mean = np.nansum(squares, axis=0) / np.maximum(known.sum(axis=0), 1)
-    return np.where(known, ((n - 1) * squares + shrinkage * mean) / (n - 1 + shrinkage), mean)
+    mean = np.nansum(squares, axis=0) / np.maximum(is_known.sum(axis=0), 1)
+    return np.where(is_known, ((n - 1) * squares + shrinkage * mean) / (n - 1 + shrinkage), mean)
 
 
 def _floor(performances):

@@ -130,24 +130,24 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     inverse = None
     if before is not None and (is_needed or postures):
         inverse = _find_inverse(before, names, is_needed)
-    given, points, whole, labels = None, None, None, []
+    checked, points, whole, labels = None, None, None, []
     if X is not None:
         if inverse is None:
-            given = model.check_performances(transform_through(before, X, params, caller))
+            checked = model.check_performances(transform_through(before, X, params, caller))
         else:
             synchronised, whole = inverse.synchronise(X, params, caller)
-            given = model.check_performances(synchronised)
-        points, labels = np.stack(given), labels_of_input(X, given)[0]
+            checked = model.check_performances(synchronised)
+        points, labels = np.stack(checked), labels_of_input(X, checked)[0]
     linear = _examples(before, inverse, len(names))
     if inverse is None:
         left_out = np.zeros(len(names))
-        return View(model, names, points, points, labels, model, given, left_out, linear)
+        return View(model, names, points, points, labels, model, checked, left_out, linear)
     variance = _RESIDUAL_FACTOR * inverse.aspace.left_out_variance_
     names = inverse.names(names)
     variance = np.append(variance, np.zeros(len(names) - len(variance)))
     back = clone(model).fit(inverse.transform(_training_of(model)), groups=model.groups_)
     synchronised = None if points is None else inverse.transform(points)
-    return View(back, names, synchronised, whole, labels, model, given, variance, linear)
+    return View(back, names, synchronised, whole, labels, model, checked, variance, linear)
 
 
 def _training_of(model):
@@ -203,8 +203,8 @@ def curves_of(estimator, X, params, caller):
     names = names_of_features(before, model, model.mean_.shape[1])
     inverse = None if before is None else _find_inverse(before, names, is_needed=False)
     if inverse is None:
-        given = model.check_performances(transform_through(before, X, params, caller))
-        return Curves(names, np.stack(given))
+        checked = model.check_performances(transform_through(before, X, params, caller))
+        return Curves(names, np.stack(checked))
     return Curves(inverse.names(names), inverse.synchronise(X, params, caller)[1])
 
 
@@ -234,8 +234,9 @@ class _Inverse(NamedTuple):
         """The performances that reach the model, and their postures on the same clock."""
         takers = [method for step in self.after for method in (step.match, step.transform)]
         postures = transform_through(self.before, X, params, caller, also=takers)
-        how = {"level": "posture", "finite": "allow-nan"}
-        whole = check_performances(self.aspace, postures, reset=False, **how)
+        whole = check_performances(
+            self.aspace, postures, reset=False, level="posture", finite="allow-nan"
+        )
         points = self.aspace.transform(postures)
         with explain_missing(caller):
             for step in self.after:
@@ -255,13 +256,13 @@ def _find_inverse(before, names, is_needed):
         return None
     steps = flat_steps(before)
     after = steps[steps.index(aspace) + 1 :]
-    others = [step for step in after if not hasattr(step, "match")]
-    if others and is_needed:
+    without_match = [step for step in after if not hasattr(step, "match")]
+    if without_match and is_needed:
         raise ValueError(
-            f"Between ASpace and ActionModel stands {others[0]}, which has no inverse: choose "
-            f"features of the model, {', '.join(names)}."
+            f"Between ASpace and ActionModel stands {without_match[0]}, which has no inverse: "
+            f"choose features of the model, {', '.join(names)}."
         )
-    return None if others else _Inverse(before_aspace, aspace, after)
+    return None if without_match else _Inverse(before_aspace, aspace, after)
 
 
 # -- limbs -----------------------------------------------------------------------------------
@@ -307,14 +308,14 @@ class LimbColumns(NamedTuple):
         skeleton = self.cosines.skeleton
         limbs, n_dims, first = skeleton.limbs, skeleton.n_dims, int(skeleton.has_height)
         n, n_frames, width = performances.shape
-        given = self.invert(performances.reshape(-1, width))
-        own = given[:, first:].reshape(len(given), -1, n_dims)
-        cosines = np.zeros((len(own), len(LIMB_NAMES), n_dims))
-        cosines[:, limb_indices(limbs)] = unit_vectors(own)
+        columns = self.invert(performances.reshape(-1, width))
+        vectors = columns[:, first:].reshape(len(columns), -1, n_dims)
+        cosines = np.zeros((len(vectors), len(LIMB_NAMES), n_dims))
+        cosines[:, limb_indices(limbs)] = unit_vectors(vectors)
         if self.cosines.reference != "parent":
             cosines = convert_to_parent_axes(cosines, limbs)
-        own = cosines[:, limb_indices(limbs)].reshape(len(given), -1)
-        return np.column_stack([given[:, :first], own]).reshape(n, n_frames, -1)
+        vectors = cosines[:, limb_indices(limbs)].reshape(len(columns), -1)
+        return np.column_stack([columns[:, :first], vectors]).reshape(n, n_frames, -1)
 
 
 def limbs_of(before, names):
@@ -334,13 +335,13 @@ def limbs_of(before, names):
     if before is None:
         return None
     steps = flat_steps(before)
-    parts = [part for step in steps for part in union_transformers(step)]
-    cosines = [part for part in parts if isinstance(part, DirectionCosines)]
+    transformers = [each for step in steps for each in union_transformers(step)]
+    cosines = [each for each in transformers if isinstance(each, DirectionCosines)]
     # With several of them the columns are ambiguous.
     columns = _columns_of(cosines[0], names) if len(cosines) == 1 else None
-    found = [k for k, step in enumerate(steps) if cosines and _passes_on(step, cosines[0])]
-    after = [step for step in steps[sum(found[:1]) + 1 :] if not isinstance(step, ASpace)]
-    invertible = found and all(hasattr(step, "inverse_transform") for step in after)
+    places = [k for k, step in enumerate(steps) if cosines and _passes_on(step, cosines[0])]
+    after = [step for step in steps[sum(places[:1]) + 1 :] if not isinstance(step, ASpace)]
+    invertible = places and all(hasattr(step, "inverse_transform") for step in after)
     return LimbColumns(cosines[0], columns, after) if columns is not None and invertible else None
 
 
@@ -354,11 +355,11 @@ def _passes_on(step, cosines):
 
 def _columns_of(cosines, names):
     """The columns of the features of DirectionCosines, also in a union; None without them."""
-    own = list(cosines.get_feature_names_out())
+    cosine_names = list(cosines.get_feature_names_out())
     for k, name in enumerate(names):
-        prefix = name.removesuffix(own[0])
-        if names[k : k + len(own)] == [f"{prefix}{x}" for x in own]:
-            return slice(k, k + len(own))
+        prefix = name.removesuffix(cosine_names[0])
+        if names[k : k + len(cosine_names)] == [f"{prefix}{x}" for x in cosine_names]:
+            return slice(k, k + len(cosine_names))
     return None
 
 
@@ -407,10 +408,10 @@ def models_of_classes(estimator, X, params, caller, only=None):
     list of ClassModel, or None
         None if there is no classifier that has models.
     """
-    found = find_classifier(estimator)
-    if found is None:
+    located = find_classifier(estimator)
+    if located is None:
         return None
-    before, classifier = found
+    before, classifier = located
     features = transform_through(before, X, params, caller)
     performances = classifier.check_performances(features)
     chosen = np.arange(len(performances))
@@ -422,9 +423,9 @@ def models_of_classes(estimator, X, params, caller, only=None):
     for column in dict.fromkeys(columns.tolist()):
         indices, label = chosen[columns == column], classifier.classes_[column]
         if collection is not None:
-            some = [collection[i] for i in indices]
+            members = [collection[i] for i in indices]
         else:
-            some = X.iloc[indices] if hasattr(X, "iloc") else np.asarray(X)[indices]
+            members = X.iloc[indices] if hasattr(X, "iloc") else np.asarray(X)[indices]
         pipe = Pipeline([*steps, *classifier.model_of(label).steps])
-        models.append(ClassModel(label, pipe, some, indices, [all_labels[i] for i in indices]))
+        models.append(ClassModel(label, pipe, members, indices, [all_labels[i] for i in indices]))
     return models
