@@ -54,26 +54,26 @@ def cut_takes(X, performances, rows):
     locations : DataFrame
         ``rows``, with the labels of the takes in place of their indices.
     """
-    given = as_collection(X)
-    takes = list(performances if given is None else given)
+    collection = as_collection(X)
+    takes = list(performances if collection is None else collection)
     numbers = rows.groupby("take")["start"].rank(method="first").astype(int).to_numpy() - 1
     tables = {i: takes[i] for i in set(rows["take"]) if isinstance(takes[i], pd.DataFrame)}
     recorded = {i: Recorded(table) for i, table in tables.items()}
-    parts = []
+    performances_cut = []
     for take, start, stop, number in zip(
         rows["take"], rows["start"], rows["stop"], numbers, strict=True
     ):
         if take in tables:
             source = tables[take]
-            part = source.iloc[start:stop]
-            part = part.set_axis(pd.RangeIndex(len(part), name=FRAME))
+            table = source.iloc[start:stop]
+            table = table.set_axis(pd.RangeIndex(len(table), name=FRAME))
             label, levels = own_label(source)
             levels = ("take",) if label is None else levels
             name = label_of_part(performances.labels[take], int(number), "part", (*levels, FRAME))
-            part.attrs = recorded[take].attrs_of(np.arange(start, stop)) | name
-            parts.append(part)
+            table.attrs = recorded[take].attrs_of(np.arange(start, stop)) | name
+            performances_cut.append(table)
         else:
-            parts.append(performances[take][start:stop].copy())
+            performances_cut.append(performances[take][start:stop].copy())
     labels = np.empty(len(rows), dtype=object)
     labels[:] = [performances.labels[take] for take in rows["take"]]
-    return parts, rows.assign(take=pd.Series(labels, index=rows.index).infer_objects())
+    return performances_cut, rows.assign(take=pd.Series(labels, index=rows.index).infer_objects())

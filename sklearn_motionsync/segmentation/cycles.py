@@ -229,19 +229,19 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             If the input breaks the contract; a take is not cyclic or too short and
             ``not_cyclic="raise"``; no take is left; or there is no such `start`.
         """
-        given, takes = check_takes(self, X, reset=True)
-        strikes = strikes_of(self, given) if self.start in STRIKES else None
+        collection, takes = check_takes(self, X, reset=True)
+        strikes = strikes_of(self, collection) if self.start in STRIKES else None
         with self._progress(fits=True) as progress:
             step = progress.stage("correlating takes", len(takes))
-            features, found = correlate_takes(self, given, takes, step)
-            kept = self._select_cyclic(takes, found)
-            if not kept:
+            features, repeats = correlate_takes(self, collection, takes, step)
+            cyclic = self._select_cyclic(takes, repeats)
+            if not cyclic:
                 n = len(takes)
                 none = "The take is not" if n == 1 else f"None of the {n} takes is"
                 raise ValueError(
                     f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
                 )
-            stretches = [(i, stretch) for i in kept for stretch in found[i].stretches]
+            stretches = [(i, stretch) for i in cyclic for stretch in repeats[i].stretches]
             sampled = [sampled_stretch(features[i], stretch) for i, stretch in stretches]
             phases = self._learn_phases(sampled, progress)
             template = average_cycle([t.values for t in sampled], phases)
@@ -254,17 +254,19 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 # The others show another movement.
                 stretches, sampled = ([x[k] for k in follow] for x in (stretches, sampled))
                 phases = self._learn_phases(sampled, progress)
-            kept = sorted({i for i, _ in stretches})
-            takes_of = [kept.index(i) for i, _ in stretches]
+            cyclic = sorted({i for i, _ in stretches})
+            takes_of = [cyclic.index(i) for i, _ in stretches]
             if strikes is not None:
                 frames = [strikes[i] for i, _ in stretches]
                 name, start = self.start, _phase_of(self.start, frames, sampled, phases)
             else:
-                curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
+                curves = start_curves(
+                    self, [collection[i] for i in cyclic], [features[i] for i in cyclic]
+                )
                 name, start = self._find_start(curves, sampled, takes_of, phases)
             template = average_cycle([t.values for t in sampled], [p - start for p in phases])
             periods = np.full(len(takes), np.nan)
-            for i in kept:
+            for i in cyclic:
                 summary = summary_of([stretch for k, stretch in stretches if k == i])
                 periods[i] = summary.found.period
         self.start_, self.template_, self.periods_ = name, template, periods
@@ -310,18 +312,20 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             take in which several cycles fit has the warning of ``fit`` instead.
         """
         check_is_fitted(self, "template_")
-        given, takes = check_takes(self, X, reset=False)
+        collection, takes = check_takes(self, X, reset=False)
         rows, periods = [], []
-        for i, number, stretch, sampled, phases in self._phases(given, takes):
+        for i, number, stretch, sampled, phases in self._phases(collection, takes):
             cycles = locate_cycles(sampled, phases, self.template_, self.incomplete)
-            own = [(i, number, *row) for row in cycles]
-            rows += own
+            cycles_of_stretch = [(i, number, *row) for row in cycles]
+            rows += cycles_of_stretch
             # Where several cycles fit there was a warning of that.
-            found = stretch.found
-            periods += [found.period if len(found.periods) == 1 else np.nan] * len(own)
+            correlation = stretch.found
+            periods += [correlation.period if len(correlation.periods) == 1 else np.nan] * len(
+                cycles_of_stretch
+            )
         table = pd.DataFrame(rows, columns=list(_COLUMNS)).astype(_COLUMNS)
         _warn_of_lengths(takes, table, np.array(periods))
-        return cut_takes(given, takes, table)
+        return cut_takes(collection, takes, table)
 
     def phases(self, X: PerformancesLike) -> list[np.ndarray]:
         """The phase of every frame.
@@ -339,9 +343,9 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             and for takes that are skipped.
         """
         check_is_fitted(self, "template_")
-        given, takes = check_takes(self, X, reset=False)
+        collection, takes = check_takes(self, X, reset=False)
         out = [np.full(len(take), np.nan) for take in takes]
-        for i, _, stretch, sampled, phases in self._phases(given, takes):
+        for i, _, stretch, sampled, phases in self._phases(collection, takes):
             inside = np.arange(stretch.start, stretch.stop)
             out[i][inside] = np.interp(inside, sampled.times, phases)
         return out
@@ -365,14 +369,14 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             of the take if it has none.
         """
         self._validate_params()
-        given, takes = check_takes(clone(self), X, reset=True)
+        collection, takes = check_takes(clone(self), X, reset=True)
         rows = []
-        for x, (stretches, found, reason) in zip(
-            takes, correlate_takes(self, given, takes)[1], strict=True
+        for x, (stretches, correlation, reason) in zip(
+            takes, correlate_takes(self, collection, takes)[1], strict=True
         ):
-            measures = found.period, found.n_cycles, found.strength
+            measures = correlation.period, correlation.n_cycles, correlation.strength
             ends = [(stretch.start, stretch.stop) for stretch in stretches]
-            rows.append((len(x), *measures, not reason, reason, found.periods.tolist(), ends))
+            rows.append((len(x), *measures, not reason, reason, correlation.periods.tolist(), ends))
         columns = ["n_frames", "period", "n_cycles", "strength", "cyclic", "reason", "periods"]
         columns.append("stretches")
         index = pd.Index(takes.labels, tupleize_cols=False, name="take")
@@ -380,8 +384,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
 
     def _select_cyclic(self, takes, found):
         """Indices of the takes that are cyclic; an error if others are not to be skipped."""
-        kept = [i for i, (_, _, reason) in enumerate(found) if not reason]
-        if len(kept) < len(takes) and self.not_cyclic == "raise":
+        cyclic = [i for i, (_, _, reason) in enumerate(found) if not reason]
+        if len(cyclic) < len(takes) and self.not_cyclic == "raise":
             i, (_, best, reason) = next((i, f) for i, f in enumerate(found) if f.reason)
             within = "" if self.period is None else f" within period={self.period}"
             raise ValueError(
@@ -392,7 +396,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             )
         several = {
             i: stretch.found
-            for i in reversed(kept)
+            for i in reversed(cyclic)
             for stretch in found[i].stretches
             if len(stretch.found.periods) > 1
         }
@@ -407,20 +411,20 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 UserWarning,
                 stacklevel=4,
             )
-        return kept
+        return cyclic
 
-    def _phases(self, given, takes):
+    def _phases(self, collection, takes):
         """Yield, for every stretch of every cyclic take, what is known of it.
 
         Index of the take, number of the stretch in it, the stretch, its samples, and their phases.
         """
-        features, found = correlate_takes(self, given, takes)
-        found = [as_learnt(self, x, f) for x, f in zip(features, found, strict=True)]
+        features, repeats = correlate_takes(self, collection, takes)
+        repeats = [as_learnt(self, x, f) for x, f in zip(features, repeats, strict=True)]
         align = match_phases if self.refine else constant_phases
-        strikes = strikes_of(self, given) if self.start_ in STRIKES else None
-        for i in self._select_cyclic(takes, found):
+        strikes = strikes_of(self, collection) if self.start_ in STRIKES else None
+        for i in self._select_cyclic(takes, repeats):
             first = 0
-            for number, stretch in enumerate(found[i].stretches):
+            for number, stretch in enumerate(repeats[i].stretches):
                 sampled = sampled_stretch(features[i], stretch)
                 phases = align(self.template_, sampled)
                 if strikes is not None:
@@ -483,7 +487,7 @@ def check_takes(segmenter, X, *, reset):
     return as_collection(X), takes
 
 
-def correlate_takes(segmenter, given, takes, step=None):
+def correlate_takes(segmenter, collection, takes, step=None):
     """The compared features of takes, in float64, and what repeats in them.
 
     The features are the directions of limbs if there is a skeleton, else those of the takes.
@@ -491,14 +495,14 @@ def correlate_takes(segmenter, given, takes, step=None):
     limits = _check_period(segmenter.period)
     if segmenter.skeleton is not None:
         cosines = DirectionCosines(segmenter.skeleton).set_output(transform="default")
-        takes = cosines.fit_transform(given)
+        takes = cosines.fit_transform(collection)
     features = [np.asarray(x, dtype=np.float64) for x in takes]
-    found = []
+    repeats = []
     for x in features:
-        found.append(find_repeats(x, segmenter.threshold, limits))
+        repeats.append(find_repeats(x, segmenter.threshold, limits))
         if step is not None:
             step()
-    return features, found
+    return features, repeats
 
 
 def as_learnt(segmenter, features, found):
@@ -584,20 +588,26 @@ def strikes_of(segmenter, X):
             "rate: frame_rate=, or tables that tell it."
         )
     recordings = Recordings(X, segmenter.skeleton, None, segmenter.frame_rate)
-    side, found = STRIKES[segmenter.start], []
+    side, strikes = STRIKES[segmenter.start], []
     for i in range(len(recordings)):
         walk = recordings.walk(i)
         wanted = FOOT_STRIKE, side
-        found.append(np.array([k for *what, k in events_of(walk) if tuple(what) == wanted]))
-        found[-1] = found[-1] / walk.per_frame
-    return found
+        strikes.append(np.array([k for *kind, k in events_of(walk) if tuple(kind) == wanted]))
+        strikes[-1] = strikes[-1] / walk.per_frame
+    return strikes
 
 
 def _phase_of(start, strikes, sampled, phases):
     """The phase at which feet strike, in the mean of stretches."""
     at = [
-        np.interp(own[(own >= take.times[0]) & (own <= take.times[-1])], take.times, of_take)
-        for own, take, of_take in zip(strikes, sampled, phases, strict=True)
+        np.interp(
+            strikes_of_take[
+                (strikes_of_take >= take.times[0]) & (strikes_of_take <= take.times[-1])
+            ],
+            take.times,
+            of_take,
+        )
+        for strikes_of_take, take, of_take in zip(strikes, sampled, phases, strict=True)
     ]
     at = np.concatenate(at)
     if not len(at):

@@ -105,17 +105,17 @@ def average_cycle(many_values, many_phases):
         after = np.clip(np.searchsorted(places, wanted), 1, len(places) - 1)
         gaps = places[after] - places[after - 1]
         share = ((wanted - places[after - 1]) / np.where(gaps > 0, gaps, 1))[:, np.newaxis]
-        found = (1 - share) * values[after - 1] + share * values[after]
+        values_between = (1 - share) * values[after - 1] + share * values[after]
         at = wanted % PHASES
-        np.add.at(sums, at, found)
+        np.add.at(sums, at, values_between)
         counts += np.bincount(at, minlength=PHASES)
     return sums / np.maximum(counts, 1)[:, np.newaxis]
 
 
 def constant_phases(template, take):
     """Phases at the mean pace, shifted to the best circular correlation with the template."""
-    own = average_cycle([take.values], [take.mean_phases])
-    products = rfft(template, axis=0) * rfft(own, axis=0).conj()
+    cycle = average_cycle([take.values], [take.mean_phases])
+    products = rfft(template, axis=0) * rfft(cycle, axis=0).conj()
     correlation = irfft(products.sum(axis=1), PHASES)
     return take.mean_phases + first_largest(correlation) / PHASES
 
@@ -198,11 +198,11 @@ def locate_cycles(take, phases, template, incomplete):
     rising = phases + np.linspace(0, 1e-9, len(phases))
     frames = whole(np.interp(begins, rising, take.times))
     outer = [(take.begins, slice(1, None), 0, _OUTER), (take.ends, slice(-1), -1, -_OUTER)]
-    for within, others, k, share in outer:
+    for within, inner, k, share in outer:
         if within and len(begins):
             first, last = sorted([begins[k], begins[k] + share])
             if not _keeps_pace(template, take, phases, first, last):
-                begins, frames = begins[others], frames[others]
+                begins, frames = begins[inner], frames[inner]
     ends = list(zip(begins, frames.tolist(), strict=True))
     if incomplete:
         ends = [(phases[0], int(take.times[0])), *ends, (phases[-1], int(take.times[-1]))]

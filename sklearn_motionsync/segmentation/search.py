@@ -190,15 +190,15 @@ def find_performances(
     """
     X = as_takes(X, univariate=True)
     checker = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
-    given = check_performances(checker, X, reset=True, level="sequence", facts=())
-    searched, paces, known = _at_rate_of(pattern, X, given, frame_rate, pattern_rate)
+    checked = check_performances(checker, X, reset=True, level="sequence", facts=())
+    searched, paces, is_rate_known = _at_rate_of(pattern, X, checked, frame_rate, pattern_rate)
     groups_given = groups
     synchronizer, takes, groups = _reach(pattern, searched, groups)
-    sources = given if searched is X else searched
+    sources = checked if searched is X else searched
     for i, (before, after) in enumerate(zip(sources, takes, strict=True)):
         if len(before) != len(after):
             raise ValueError(
-                f"{given.called(i)} has {len(before)} frames, and {len(after)} after the steps "
+                f"{checked.called(i)} has {len(before)} frames, and {len(after)} after the steps "
                 "before the synchronizer, so frames of hits are unknown. Resample the takes first."
             )
     dissimilarity = WindowDissimilarity(synchronizer, groups, length=durations is None)
@@ -223,14 +223,13 @@ def find_performances(
                 u = -np.log([hit.score for hit in hits if hit.proposed >= hopeless])
                 level = float(np.exp(-dissimilarity.threshold_of_take(limit, u, len(take))))
             best = best_hits(hits, 0.0 if threshold is None else level, max_hits)
-            found = in_frames_given(best, pace, len(given[i]), durations)
-            hits_of_all += [(i, *hit, level) for hit in found]
+            in_own_frames = in_frames_given(best, pace, len(checked[i]), durations)
+            hits_of_all += [(i, *hit, level) for hit in in_own_frames]
     types = {"take": int, "start": int, "stop": int, "score": float, "threshold": float}
     rows = pd.DataFrame(hits_of_all, columns=list(types)).astype(types)
-    if threshold is not None and rows.empty and not known:
-        how = {"threshold": threshold, "coverage": coverage, "durations": durations}
-        _warn_of_other_rates(pattern, X, how | {"groups": groups_given})
-    return cut_takes(X, given, rows)
+    if threshold is not None and rows.empty and not is_rate_known:
+        _warn_of_other_rates(pattern, X, threshold, coverage, durations, groups_given)
+    return cut_takes(X, checked, rows)
 
 
 def _at_rate_of(pattern, X, given, frame_rate, pattern_rate):
@@ -253,42 +252,55 @@ def _at_rate_of(pattern, X, given, frame_rate, pattern_rate):
     rates = [facts.get("frame_rate") for facts in given.facts] or [None] * len(given)
     if frame_rate is not None:
         rates = np.broadcast_to(as_frame_rates(frame_rate, len(given)).ravel(), len(given)).tolist()
-    known = _frame_rate_of(pattern) if pattern_rate is None else float(pattern_rate)
-    unsure = [i for i, rate in enumerate(rates) if (rate is None) != (known is None)]
+    rate_of_pattern = _frame_rate_of(pattern) if pattern_rate is None else float(pattern_rate)
+    unsure = [i for i, rate in enumerate(rates) if (rate is None) != (rate_of_pattern is None)]
     if unsure:
         rate = rates[unsure[0]]
-        first, second = ("The pattern", given.called(unsure[0]))[:: 1 if known is None else -1]
+        first, second = ("The pattern", given.called(unsure[0]))[
+            :: 1 if rate_of_pattern is None else -1
+        ]
         warnings.warn(
             f"{first} has no known frame rate, {within(second)} has "
-            f"{known or rate:g} frames a second: both are taken to have the same. Give the other "
-            f"one, {'pattern_rate' if known is None else 'frame_rate'}=.",
+            f"{rate_of_pattern or rate:g} frames a second: both are taken to have the same. "
+            f"Give the other one, {'pattern_rate' if rate_of_pattern is None else 'frame_rate'}=.",
             UserWarning,
             stacklevel=4,
         )
-    paces = [1.0 if known is None or rate is None else rate / known for rate in rates]
+    paces = [
+        1.0 if rate_of_pattern is None or rate is None else rate / rate_of_pattern for rate in rates
+    ]
     paces = [1.0 if abs(pace - 1) <= SAME_RATE else pace for pace in paces]
-    is_known = known is not None or any(rate is not None for rate in rates)
+    is_known = rate_of_pattern is not None or any(rate is not None for rate in rates)
     if set(paces) == {1.0}:
         return X, paces, is_known
     searched = list(as_collection(X))
     for i, pace in enumerate(paces):
         if not 1 / _MOST <= pace <= _MOST:
             raise ValueError(
-                f"{given.called(i)} has {rates[i]:g} frames a second, the pattern {known:g}: one "
-                f"is more than {_MOST} times the other. Correct the wrong one, "
-                "attrs['frame_rate'], an index in seconds, frame_rate or pattern_rate."
+                f"{given.called(i)} has {rates[i]:g} frames a second, the pattern "
+                f"{rate_of_pattern:g}: one is more than {_MOST} times the other. Correct the wrong "
+                "one, attrs['frame_rate'], an index in seconds, frame_rate or pattern_rate."
             )
         if pace != 1:
-            searched[i] = _resample(searched[i], given[i], pace, known)
+            searched[i] = _resample(searched[i], given[i], pace, rate_of_pattern)
     return searched, paces, is_known
 
 
-def _warn_of_other_rates(pattern, X, how):
+def _warn_of_other_rates(pattern, X, threshold, coverage, durations, groups):
     """Warn if takes without hits would have some at another frame rate."""
     counts = {}
     for times in _OTHER_RATES:
-        _, found = find_performances(pattern, X, frame_rate=times, pattern_rate=1.0, **how)
-        counts[times] = len(found)
+        _, locations = find_performances(
+            pattern,
+            X,
+            threshold=threshold,
+            coverage=coverage,
+            durations=durations,
+            groups=groups,
+            frame_rate=times,
+            pattern_rate=1.0,
+        )
+        counts[times] = len(locations)
     best = max(counts, key=counts.get)
     if counts[best]:
         warnings.warn(
@@ -306,8 +318,8 @@ def _frame_rate_of(pattern):
         return facts_of(as_pandas(pattern)).get("frame_rate")
     steps = [each for step in flat_steps(pattern) for each in union_transformers(step)]
     steps.append(find_synchronizer(pattern)[1])
-    found = (facts_in_fit(step).get("frame_rate", ()) for step in steps)
-    rates = next(filter(None, found), ())
+    rates_of_steps = (facts_in_fit(step).get("frame_rate", ()) for step in steps)
+    rates = next(filter(None, rates_of_steps), ())
     return rates[0] if len(rates) == 1 else None
 
 
@@ -370,9 +382,9 @@ class Hit(NamedTuple):
 
 def best_hits(hits, threshold, count):
     """Start, stop and score of the best hits that reach a threshold, in order of time."""
-    found = [hit for hit in hits if hit.score >= threshold]
-    found = [found[k] for k in _best_first([hit.score for hit in found])]
-    return sorted(hit[:3] for hit in found[:count])
+    reaching = [hit for hit in hits if hit.score >= threshold]
+    reaching = [reaching[k] for k in _best_first([hit.score for hit in reaching])]
+    return sorted(hit[:3] for hit in reaching[:count])
 
 
 def _best_first(scores):
@@ -402,7 +414,8 @@ class WindowSearch:
         for i, k in enumerate(order):
             limits = self._limits(windows[k], refined)
             if limits is not None:
-                insort(refined, self._refine(windows[k], scores[k], *limits))
+                first, last = limits
+                insort(refined, self._refine(windows[k], scores[k], first, last))
             for _ in range(due[i]):
                 step()
         for _ in range(0 if len(order) else n_steps):
@@ -421,13 +434,13 @@ class WindowSearch:
         window, move = np.asarray(window), max(1, int(_FIRST_MOVE * (window[1] - window[0])))
         proposed = float(score)
         while move:
-            some = window + move * _MOVES
-            sizes = some[:, 1] - some[:, 0]
-            inside = (some[:, 0] >= first) & (some[:, 1] <= last)
-            some = some[inside & (sizes >= self._shortest) & (sizes <= self._longest)]
-            scores = np.exp(-self._dissimilarity(self._take, some))
+            candidates = window + move * _MOVES
+            sizes = candidates[:, 1] - candidates[:, 0]
+            inside = (candidates[:, 0] >= first) & (candidates[:, 1] <= last)
+            candidates = candidates[inside & (sizes >= self._shortest) & (sizes <= self._longest)]
+            scores = np.exp(-self._dissimilarity(self._take, candidates))
             if scores.max(initial=0) > score * (1 + _EQUAL):
-                window, score = some[first_largest(scores, _EQUAL * score)], scores.max()
+                window, score = candidates[first_largest(scores, _EQUAL * score)], scores.max()
             else:
                 move //= 2
         return Hit(int(window[0]), int(window[1]), float(score), proposed)
@@ -484,15 +497,16 @@ def _training_groups(pattern, reached, groups):
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
     if not models or not hasattr(models[0], "groups_"):
         return None
-    known, n_seen = models[0].groups_, models[0].n_samples_seen_
+    model_groups, n_seen = models[0].groups_, models[0].n_samples_seen_
     # The model may have learnt from other performances since, by partial_fit.
-    if len(known) == n_seen == count:
-        return known
-    if len(np.unique(known)) < len(known):
+    if len(model_groups) == n_seen == count:
+        return model_groups
+    if len(np.unique(model_groups)) < len(model_groups):
         warnings.warn(
-            f"The model keeps the groups of {len(known)} of {counted(n_seen, 'performance')}, the "
-            f"synchronizer was fitted on {count}: their groups are unknown, each counts as its "
-            "own, and the threshold will be too high. Give groups, one for each performance.",
+            f"The model keeps the groups of {len(model_groups)} of "
+            f"{counted(n_seen, 'performance')}, the synchronizer was fitted on {count}: their "
+            "groups are unknown, each counts as its own, and the threshold will be too high. Give "
+            "groups, one for each performance.",
             UserWarning,
             stacklevel=5,
         )
@@ -502,10 +516,10 @@ def _training_groups(pattern, reached, groups):
 def _check_durations(synchronizer, durations, pace):
     """The smallest and the largest number of frames of a window of takes at a pace."""
     if durations is None:
-        known = synchronizer.lengths_
-        margin = _MARGIN if len(known) > 1 else _MARGIN_OF_ONE
-        shortest = max(_SHORTEST, whole(known.min() / margin, "down"))
-        return shortest, whole(known.max() * margin, "up")
+        lengths = synchronizer.lengths_
+        margin = _MARGIN if len(lengths) > 1 else _MARGIN_OF_ONE
+        shortest = max(_SHORTEST, whole(lengths.min() / margin, "down"))
+        return shortest, whole(lengths.max() * margin, "up")
     pair = tuple(durations) if isinstance(durations, (tuple, list, np.ndarray)) else ()
     is_pair = len(pair) == 2 and all(isinstance(n, Integral) for n in pair)
     if not (is_pair and 2 <= pair[0] <= pair[1]):
@@ -563,9 +577,10 @@ class Proposer(NamedTuple):
         features = synchronizer.features_
         pattern = synchronizer.pattern_.astype(np.float64)
         base = features(features.positions([pattern], n_frames))
-        how = {"max_offset": _SHARE, "max_rate": _MAX_RATE, "free": True}
         mu = _SMOOTHNESS * float(np.square(base).sum()) / n_frames
-        trellis = Trellis.on_clock(features.cost, n_frames, mu, **how)
+        trellis = Trellis.on_clock(
+            features.cost, n_frames, mu, max_offset=_SHARE, max_rate=_MAX_RATE, free=True
+        )
         # The filter of velocities is as wide in a portion as in the pattern.
         share = (n_frames - 1) / (n_frames - 1 + 2 * trellis.width)
         features = features.replace(velocity_smoothing=share * features.velocity_smoothing)
@@ -574,8 +589,8 @@ class Proposer(NamedTuple):
     def __call__(self, take, step=None):
         """Distinct windows of a take (n_frames, n_features): (n_windows, 2) of start and stop."""
         lengths = self.lengths[self.lengths <= len(take)]
-        found = [self._at_scale(take, int(length), step) for length in lengths]
-        windows = np.concatenate([np.empty((0, 2), dtype=np.intp), *found])
+        windows_of_scales = [self._at_scale(take, int(length), step) for length in lengths]
+        windows = np.concatenate([np.empty((0, 2), dtype=np.intp), *windows_of_scales])
         sizes = windows[:, 1] - windows[:, 0]
         fits = (self.shortest <= sizes) & (sizes <= self.longest)
         return np.unique(windows[fits], axis=0)
@@ -596,17 +611,17 @@ class Proposer(NamedTuple):
         n_frames, width = self.base.shape[1], self.trellis.width
         starts, pace = self._starts(len(take), length), (length - 1) / (n_frames - 1)
         clock = np.arange(-width, n_frames + width) * pace
-        found = []
-        for some in even_slices(len(starts), _PROPOSAL_BATCH):
-            portions = at_times(take, starts[some, np.newaxis] + clock)
+        windows = []
+        for rows in even_slices(len(starts), _PROPOSAL_BATCH):
+            portions = at_times(take, starts[rows, np.newaxis] + clock)
             moving = self.features(self.features.unit(portions))
             paths = self.trellis.paths(self.base, moving)[0]
-            first, last = starts[some] + paths[:, 0] * pace, starts[some] + length - 1
+            first, last = starts[rows] + paths[:, 0] * pace, starts[rows] + length - 1
             window = np.stack([first, last + paths[:, -1] * pace + 1], axis=1)
-            found.append(np.clip(whole(window), 0, len(take)))
+            windows.append(np.clip(whole(window), 0, len(take)))
             if step is not None:
                 step()
-        return np.concatenate(found)
+        return np.concatenate(windows)
 
 
 def scales(shortest, longest):

@@ -220,15 +220,18 @@ def _distinct_periods(lags, values, period):
 
     The ``period`` is kept.
     """
-    kept = []
+    distinct = []
     for lag, value in zip(lags, values, strict=True):
-        ratios, others = lag / np.array([k for k, _ in kept]), np.array([v for _, v in kept])
+        ratios, other_values = (
+            lag / np.array([k for k, _ in distinct]),
+            np.array([v for _, v in distinct]),
+        )
         multiples = np.round(ratios)
         repeats = np.abs(ratios - multiples) <= _MULTIPLE * multiples
-        explained = (ratios < _DISTINCT) | (repeats & (others >= _NEAR * value))
+        explained = (ratios < _DISTINCT) | (repeats & (other_values >= _NEAR * value))
         if lag == period or not explained.any():
-            kept.append((lag, value))
-    return np.array([lag for lag, _ in kept])
+            distinct.append((lag, value))
+    return np.array([lag for lag, _ in distinct])
 
 
 def required_strength(n_cycles, breadth, threshold):

@@ -88,16 +88,16 @@ def find_repeats(x, threshold, limits=None):
     -------
     Repeats
     """
-    take, stretches, parts = _Take(x, limits), [], [(0, len(x))]
-    while parts:
-        part = parts.pop()
+    take, stretches, open_parts = _Take(x, limits), [], [(0, len(x))]
+    while open_parts:
+        part = open_parts.pop()
         stretch = _find_first(take, part, threshold)
         if stretch is not None:
             stretches.append(stretch)
-            parts += [(part[0], stretch.start), (stretch.stop, part[1])]
+            open_parts += [(part[0], stretch.start), (stretch.stop, part[1])]
     if not stretches:
-        found = correlate(x, limits)
-        return Repeats([], found, rejection_reason(found, threshold) or "not cyclic")
+        correlation = correlate(x, limits)
+        return Repeats([], correlation, rejection_reason(correlation, threshold) or "not cyclic")
     return summary_of(_join(take, sorted(stretches, key=lambda s: s.start), threshold))
 
 
@@ -116,13 +116,16 @@ def _join(take, stretches, threshold):
         near = stretch.start - before.stop <= whole(_BETWEEN * min(a.period, b.period), "down")
         if near and _ratio(a.period, b.period) <= _SAME_PACE:
             start, stop = before.start, stretch.stop
-            found = correlate(take.x[start:stop], take.limits)
-            if rejection_reason(found, threshold) or _ratio(found.period, a.period) > _SAME_PACE:
+            correlation = correlate(take.x[start:stop], take.limits)
+            if (
+                rejection_reason(correlation, threshold)
+                or _ratio(correlation.period, a.period) > _SAME_PACE
+            ):
                 # The pace changes too much for a single period.
                 longer = max(before, stretch, key=lambda one: one.stop - one.start).found
                 n_cycles = a.n_cycles + b.n_cycles
-                found = with_period(longer, (stop - start) / n_cycles, n_cycles)
-            joined[-1] = Stretch(start, stop, found)
+                correlation = with_period(longer, (stop - start) / n_cycles, n_cycles)
+            joined[-1] = Stretch(start, stop, correlation)
         else:
             joined.append(stretch)
     return joined
@@ -138,19 +141,21 @@ def _find_first(take, part, threshold):
             break
         tried.append(proposal)
         start, stop, _, group = proposal
-        found = correlate(take.x[start:stop], take.limits)
+        correlation = correlate(take.x[start:stop], take.limits)
         for _ in range(2):
-            ends = take.ends(found.period, (start, stop), part) if found.n_cycles else None
+            ends = (
+                take.ends(correlation.period, (start, stop), part) if correlation.n_cycles else None
+            )
             if ends is None:
                 break
-            again = correlate(take.x[slice(*ends)], take.limits)
-            if not again.n_cycles or _ratio(again.period, found.period) > _SAME_LAG:
+            again = correlate(take.x[ends[0] : ends[1]], take.limits)
+            if not again.n_cycles or _ratio(again.period, correlation.period) > _SAME_LAG:
                 break
-            (start, stop), found = ends, again
-        if not rejection_reason(found, threshold):
-            required = take.required(found, group.places(start, stop), threshold)
-            if min(found.strength, _HIGHEST) >= required:
-                return Stretch(int(start), int(stop), found)
+            (start, stop), correlation = ends, again
+        if not rejection_reason(correlation, threshold):
+            required = take.required(correlation, group.places(start, stop), threshold)
+            if min(correlation.strength, _HIGHEST) >= required:
+                return Stretch(int(start), int(stop), correlation)
     return None
 
 
@@ -161,8 +166,8 @@ def _ratio(one, other):
 def _are_same(one, other):
     """Whether proposals are of about the same lag and place."""
     together = min(one[1], other[1]) - max(one[0], other[0])
-    both = max(one[1], other[1]) - min(one[0], other[0])
-    return _ratio(one[2], other[2]) < _SAME_LAG and together > _SAME_PLACE * both
+    spanned = max(one[1], other[1]) - min(one[0], other[0])
+    return _ratio(one[2], other[2]) < _SAME_LAG and together > _SAME_PLACE * spanned
 
 
 class _Take:
@@ -178,7 +183,7 @@ class _Take:
         least, most = (0, np.inf) if limits is None else limits
         while groups[0][0] * step <= longest:
             for group in groups:
-                lags = np.arange(*group)
+                lags = np.arange(group[0], group[1])
                 frames = lags * step
                 lags = lags[
                     (frames <= min(longest, most * _SAME_LAG)) & (frames >= least / _SAME_LAG)
@@ -189,12 +194,12 @@ class _Take:
 
     def proposals(self, part):
         """Start, stop, lag and group of the best interval of each lag, the best one first."""
-        found = [
+        weighed = [
             (weight, (start, stop, lag, group))
             for group in self.groups
             for weight, start, stop, lag in group.proposals(part)
         ]
-        return [proposal for _, proposal in sorted(found, key=lambda pair: -pair[0])]
+        return [proposal for _, proposal in sorted(weighed, key=lambda pair: -pair[0])]
 
     def ends(self, period, inside, part):
         """Start and stop of an interval at its period, within a part; None if it is too short."""
@@ -305,7 +310,7 @@ def _best_interval(values, deepest=np.inf):
             return total, start, stop
         middle = start + int(falls.argmax())
         sides = [(start, middle), (middle, stop)]
-        first, last = max(sides, key=lambda side: _largest_sum(values, *side)[0])
+        first, last = max(sides, key=lambda side: _largest_sum(values, side[0], side[1])[0])
 
 
 def _largest_sum(values, first, last):

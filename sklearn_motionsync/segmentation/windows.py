@@ -163,10 +163,11 @@ class WindowDissimilarity:
         portions = even_slices(_N_RANDOM, _WINDOW_BATCH)
         counts = [portion.stop - portion.start for portion in portions]
         movements = random_movements(self._training, counts)
-        found = [
-            self._measure(some, np.full(len(some), self._typical_length)) for some in movements
+        dissimilarities = [
+            self._measure(portion, np.full(len(portion), self._typical_length))
+            for portion in movements
         ]
-        return float(np.quantile(np.concatenate(found), _RANDOM_QUANTILE))
+        return float(np.quantile(np.concatenate(dissimilarities), _RANDOM_QUANTILE))
 
     def _positions(self, performances):
         """Performances at all positions, in the unit of the features, in double precision."""
@@ -202,10 +203,10 @@ def random_movements(positions, counts):
     center = postures.mean(axis=0)
     _, spread, axes = np.linalg.svd(postures - center, full_matrices=False)
     axes *= spread[:, np.newaxis] / np.sqrt(len(postures))
-    kept, rng = np.exp(-1 / n_positions), np.random.default_rng(0)
+    memory, rng = np.exp(-1 / n_positions), np.random.default_rng(0)
     for count in counts:
         steps = rng.standard_normal((count, n_positions, len(axes)))
         # Stationary from the first position on.
-        steps[:, 1:] *= np.sqrt(1 - kept**2)
-        course = lfilter([1], [1, -kept], steps, axis=1)
+        steps[:, 1:] *= np.sqrt(1 - memory**2)
+        course = lfilter([1], [1, -memory], steps, axis=1)
         yield smooth(course, SMOOTHING * (n_positions - 1)) @ axes + center
