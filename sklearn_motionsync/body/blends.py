@@ -106,10 +106,10 @@ def blend_bodies(arrays, frames, weights, skeleton, owner=None):
     blend = structure.joints_of(points)
     for j in loose_joints(skeleton):
         columns = slice(skeleton.n_dims * j, skeleton.n_dims * (j + 1))
-        own = [x[:, columns] for x in arrays]
+        columns_of_joint = [x[:, columns] for x in arrays]
         # What stands in the room does not turn with the body.
-        if not any(np.ptp(x, axis=0).any() for x in own):
-            blend[:, columns] = blend_numbers(own, frames, weights)
+        if not any(np.ptp(x, axis=0).any() for x in columns_of_joint):
+            blend[:, columns] = blend_numbers(columns_of_joint, frames, weights)
     return blend
 
 
@@ -152,9 +152,9 @@ def _blend_path(figures, frames, weights, size):
     rotation = (between * np.diff(angles, axis=1)).sum(axis=0)
     angle = np.arctan2(start[1], start[0]) + np.concatenate([[0], np.cumsum(rotation)])
     steps = 0
-    for x, f, own, w in zip(figures, frames, angles, between, strict=True):
+    for x, f, heading, w in zip(figures, frames, angles, between, strict=True):
         step = np.diff(at_frames(x.place, f), axis=0)[:, np.newaxis] / x.size
-        step = _rotate(step, _between(own), inverse=True)[:, 0]
+        step = _rotate(step, _between(heading), inverse=True)[:, 0]
         steps = steps + w[:, np.newaxis] * step
     steps = steps * _between(size)[:, np.newaxis]
     steps = _rotate(steps[:, np.newaxis], _between(angle))[:, 0]
@@ -174,18 +174,18 @@ def _hold_feet(points, structure, arrays, figures, angle, frames, weights, size)
     soles = [p for leg in structure.legs for p in leg.soles]
     stands, steps, heights, lowest = 0, 0, floor, floor
     for x, figure, f, w in zip(arrays, figures, frames, weights, strict=True):
-        own, between = structure.points_of(x), _between(w)
+        points_of_trial, between = structure.points_of(x), _between(w)
         middle = np.clip(_between(f) - 0.5, 0, len(x) - 2)
-        found = find_stances(own, structure.legs, figure.size)
-        found = np.stack([np.interp(middle, np.arange(len(x) - 1), one) for one in found])
-        stands = stands + between * found
-        track, facing = at_frames(own[:, soles], f), at_frames(figure.angle, f)
+        stances = find_stances(points_of_trial, structure.legs, figure.size)
+        stances = np.stack([np.interp(middle, np.arange(len(x) - 1), one) for one in stances])
+        stands = stands + between * stances
+        track, facing = at_frames(points_of_trial[:, soles], f), at_frames(figure.angle, f)
         step = _rotate(np.diff(track, axis=0), _between(facing), inverse=True)
         step = _rotate(step, _between(angle))[..., [0, 2]].transpose(1, 0, 2) / figure.size
         steps = steps + (between * _between(size))[:, np.newaxis] * step
         level = (track[..., 1].T - figure.foot.min()) / figure.size
         heights = heights + w * size * level
-        least = (own[:, soles, 1].min(axis=0) - figure.foot.min()) / figure.size
+        least = (points_of_trial[:, soles, 1].min(axis=0) - figure.foot.min()) / figure.size
         lowest = lowest + w * size * least[:, np.newaxis]
     forward = np.stack([-np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
     return hold_feet(points, structure.legs, stands, steps, heights, lowest, forward, size)
@@ -199,8 +199,8 @@ def _between(x):
 def _blend_heights(tracks, figures, frames, weights, size):
     """Heights above each floor, blended in units of the body, on the mean floor."""
     floors = [x.foot.min() for x in figures]
-    own = [(x - y) / f.size for x, y, f in zip(tracks, floors, figures, strict=True)]
-    return blend_numbers(own, frames, weights) * size + weights[:, 0] @ floors
+    above_floor = [(x - y) / f.size for x, y, f in zip(tracks, floors, figures, strict=True)]
+    return blend_numbers(above_floor, frames, weights) * size + weights[:, 0] @ floors
 
 
 # -- bodies as links along axes that turn with them ---------------------------------------
@@ -257,9 +257,9 @@ class LinkStructure:
             joints = skeleton.indices_of(name)
             # The mean of several joints is a point of its own.
             self._points[name] = joints[0] if isinstance(at, str) else self._count()
-        for part in _MIDPOINTS:
-            if part in skeleton.limbs:
-                self._points[part] = self._count()
+        for limb in _MIDPOINTS:
+            if limb in skeleton.limbs:
+                self._points[limb] = self._count()
         choices = ("pelvis", "hip", "neck", "shoulder", *LANDMARKS)
         self._origin = next(self._points[name] for name in choices if name in self._points)
         self.links, self.rigid = self._find_links()
@@ -300,8 +300,10 @@ class LinkStructure:
         """
         norms = [np.linalg.norm(x.links, axis=2) / x.size for x in figures]
         shown = np.all([(x > _LEAST_LENGTH).all(axis=0) for x in norms], axis=0)
-        kept = np.all([np.ptp(x, axis=0) < _SAME_LENGTH * x.max(axis=0) for x in norms], axis=0)
-        return shown & (self.rigid | kept)
+        keeps_length = np.all(
+            [np.ptp(x, axis=0) < _SAME_LENGTH * x.max(axis=0) for x in norms], axis=0
+        )
+        return shown & (self.rigid | keeps_length)
 
     def _count(self):
         """The number of points: the joints, means of joints, and midpoints."""
@@ -311,19 +313,19 @@ class LinkStructure:
         """Points (n_frames, n_points, n_dims), y up."""
         skeleton = self.skeleton
         joints = to_y_up(positions.reshape(len(positions), -1, skeleton.n_dims), skeleton)
-        others = np.zeros((len(joints), self._count() - joints.shape[1], joints.shape[2]))
-        points = np.concatenate([joints, others], axis=1)
+        further = np.zeros((len(joints), self._count() - joints.shape[1], joints.shape[2]))
+        points = np.concatenate([joints, further], axis=1)
         for name, at in skeleton.landmarks.items():
             if not isinstance(at, str):
                 points[:, self._points[name]] = joints[:, skeleton.indices_of(name)].mean(axis=1)
-        for part in set(_MIDPOINTS) & set(self._points):
-            pair = [self._points[f"{side}_{part}"] for side in SIDES]
-            points[:, self._points[part]] = points[:, pair].mean(axis=1)
+        for limb in set(_MIDPOINTS) & set(self._points):
+            pair = [self._points[f"{side}_{limb}"] for side in SIDES]
+            points[:, self._points[limb]] = points[:, pair].mean(axis=1)
         return points
 
     def _find_links(self):
         points, joints = self._points, self.skeleton.joints
-        pairs = [(m, part) for part, m in _MIDPOINTS.items() if {m, part} <= set(points)]
+        pairs = [(m, limb) for limb, m in _MIDPOINTS.items() if {m, limb} <= set(points)]
         n_midpoints = len(pairs)
         for name in self.skeleton.limbs:
             start, end = LIMBS[name][:2]
@@ -342,9 +344,9 @@ class LinkStructure:
         links = _extend(links, self._origin, self.skeleton.bones, ())
         feet = [
             (points[f"{side}_ankle"], joint)
-            for side, own in self._find_feet().items()
+            for side, joints_of_foot in self._find_feet().items()
             if f"{side}_ankle" in points
-            for joint in own
+            for joint in joints_of_foot
         ]
         links = _extend(links, self._origin, [*self.skeleton.bones, *feet], range(len(joints)))
         rigid = {*pairs[n_midpoints:], *backwards[n_midpoints:], *self.skeleton.bones}
@@ -359,25 +361,25 @@ class LinkStructure:
             if {(hip, knee), (knee, ankle)} <= set(self.links):
                 foot = self._carried_by(ankle)
                 soles = [p for p in feet[side] if p in foot]
-                rest = [p for p in self._carried_by(knee) if p not in foot]
-                legs.append(Leg(hip, knee, ankle, [ankle, *soles], rest, foot))
+                carried = [p for p in self._carried_by(knee) if p not in foot]
+                legs.append(Leg(hip, knee, ankle, [ankle, *soles], carried, foot))
         return legs
 
     def _find_feet(self):
         joints, skeleton = self.skeleton.joints, self.skeleton
-        found = guess_feet(joints, skeleton.landmarks)
+        joints_of_feet = guess_feet(joints, skeleton.landmarks)
         return {
-            side: [joints.index(j) for name, j in found.items() if name.startswith(side)]
+            side: [joints.index(j) for name, j in joints_of_feet.items() if name.startswith(side)]
             for side in SIDES
         }
 
     def _carried_by(self, point):
         """A point, and those that links join to it."""
-        found = [point]
+        carried = [point]
         for near, far in self.links:
-            if near in found:
-                found.append(far)
-        return found
+            if near in carried:
+                carried.append(far)
+        return carried
 
     def _heading(self, points):
         lateral = next((name for name in LATERAL_LIMBS if name in self.skeleton.limbs), None)

@@ -189,14 +189,14 @@ def _find_events(walk: Walk):
             offs[side] = _off_of_runner(walk, side, extremes)
         else:
             offs[side] = [k for k, _ in extremes]
-    found = [(FOOT_STRIKE, side, k) for side, at in strikes.items() for k in at]
-    found += [
+    events = [(FOOT_STRIKE, side, k) for side, at in strikes.items() for k in at]
+    events += [
         (FOOT_OFF, side, k)
         for side, at in offs.items()
         for k in at
         if _is_seen(walk.heels[side], k)
     ]
-    return sorted(found, key=lambda event: event[2])
+    return sorted(events, key=lambda event: event[2])
 
 
 def _strikes(walk, side):
@@ -205,11 +205,11 @@ def _strikes(walk, side):
     ahead = _farthest(walk, side, heel, 1)
     rise = walk.filtered(heel[:, 1], _ACCELERATION, 2)
     doubt = 0.0 if walk.has_heel[side] else _ANKLE_STRIKE
-    found = _DelayedPeak(walk, side, rise, ahead, _STRIKE, doubt)
-    if not found.is_known:
+    peak = _DelayedPeak(walk, side, rise, ahead, _STRIKE, doubt)
+    if not peak.is_known:
         rise = -walk.filtered(heel[:, 1], _ACCELERATION)
-        found = _DelayedPeak(walk, side, rise, ahead, _STRIKE, doubt)
-    at = [found.after(k, is_end) for k, is_end in ahead]
+        peak = _DelayedPeak(walk, side, rise, ahead, _STRIKE, doubt)
+    at = [peak.after(k, is_end) for k, is_end in ahead]
     return [float(k) for k in at if k is not None and _is_seen(heel, k)]
 
 
@@ -217,9 +217,9 @@ def _is_running(walk, strikes, behind):
     """Whether the toes are farthest behind about when the other foot strikes; a walker's, later."""
     late = []
     for side, extremes in behind.items():
-        others = np.array([k for other, at in strikes.items() if other != side for k in at])
-        if side in walk.toes and len(others):
-            late += [k - others[np.abs(others - k).argmin()] for k, _ in extremes]
+        other_strikes = np.array([k for other, at in strikes.items() if other != side for k in at])
+        if side in walk.toes and len(other_strikes):
+            late += [k - other_strikes[np.abs(other_strikes - k).argmin()] for k, _ in extremes]
     late = [k for k in late if abs(k) < _OTHER_STRIKE * walk.rate]
     return bool(late) and np.median(late) < _RUNNING * walk.rate
 
@@ -227,15 +227,15 @@ def _is_running(walk, strikes, behind):
 def _off_of_runner(walk, side, behind):
     """Samples at which a runner's foot leaves the ground."""
     rise = walk.filtered(walk.toes[side][:, 1], _ACCELERATION, 2)
-    found = _DelayedPeak(walk, side, rise, behind, _RUN_OFF)
-    return [found.after(k) for k, _ in behind]
+    peak = _DelayedPeak(walk, side, rise, behind, _RUN_OFF)
+    return [peak.after(k) for k, _ in behind]
 
 
 def _off_of_ankle(walk, side, behind):
     """Samples at which a foot without toes leaves the ground."""
     rise = walk.filtered(walk.heels[side][:, 1], _ACCELERATION, 1)
-    found = _DelayedPeak(walk, side, rise, behind, _RISE)
-    return [found.after(k) + _ANKLE_OFF * walk.rate for k, _ in behind]
+    peak = _DelayedPeak(walk, side, rise, behind, _RISE)
+    return [peak.after(k) + _ANKLE_OFF * walk.rate for k, _ in behind]
 
 
 class _DelayedPeak:
@@ -288,12 +288,12 @@ class _DelayedPeak:
         it is at least half as high as that of the mean, and noise allows; else None.
         """
         if is_end:
-            found = self._peak_between(k, k + self._last) if self._is_clear else None
-            is_high = found is not None and self._curve[round(found)] > self._height / 2
-            return found if is_high else None
+            at = self._peak_between(k, k + self._last) if self._is_clear else None
+            is_high = at is not None and self._curve[round(at)] > self._height / 2
+            return at if is_high else None
         middle, around = k + self.delay, _AROUND * self._rate
-        found = self._peak_between(middle - around, middle + around)
-        return middle if found is None else middle + self._own * (found - middle)
+        at = self._peak_between(middle - around, middle + around)
+        return middle if at is None else middle + self._own * (at - middle)
 
     def _share(self, spread, count, doubt):
         """The weight of the peak of a mean of strides against a prior of this spread."""
@@ -312,32 +312,32 @@ def _farthest(walk, side, points, sign):
     The other foot must have moved the other way: the pelvis alone moves in a squat.
     """
     curve = sign * walk.filtered(walk.ahead(points), _POSITION)
-    known = curve[~np.isnan(curve)]
-    if not len(known):
+    seen = curve[~np.isnan(curve)]
+    if not len(seen):
         return []
-    low, high = np.percentile(known, [3, 97])
+    low, high = np.percentile(seen, [3, 97])
     least = max(_LEAST_SWING * (high - low), _LEAST_SHARE_OF_LEG)
     distance, out = max(1, whole(_LEAST_STRIDE * walk.rate, "down")), []
-    others = [heel for other, heel in walk.heels.items() if other != side]
-    apart = horizontal(points - (others[0] if others else walk.pelvis))
+    other_heels = [heel for other, heel in walk.heels.items() if other != side]
+    apart = horizontal(points - (other_heels[0] if other_heels else walk.pelvis))
     reach = whole(_SWING * walk.rate, "down")
     for piece in pieces(curve[:, np.newaxis]):
-        part = curve[piece]
-        floor = part.min() - high + low
+        stretch = curve[piece]
+        floor = stretch.min() - high + low
         peaks, _ = find_peaks(
-            np.concatenate([[floor], part, [floor]]), prominence=least, distance=distance
+            np.concatenate([[floor], stretch, [floor]]), prominence=least, distance=distance
         )
         for k in peaks - 1:
             # At the first samples it may have been farther before.
             is_first = k <= whole(_POSITION * walk.rate, "down")
-            is_end = is_first or k >= len(part) - 3
+            is_end = is_first or k >= len(stretch) - 3
             # A foot that is last seen on its way ahead has not been farthest.
             near = apart[max(0, piece.start + k - reach) : piece.start + k + reach]
             # Of a hidden foot it is not known.
             moved = np.linalg.norm(np.ptp(near, axis=0))
             steps = np.isnan(moved) or moved >= _LEAST_SHARE_OF_LEG
             if steps and (is_first or not is_end):
-                out.append((piece.start + (k if is_end else _between(part, k)), is_end))
+                out.append((piece.start + (k if is_end else _between(stretch, k)), is_end))
     return out
 
 
@@ -347,18 +347,18 @@ def _mean_around(values, at, lags):
         return np.full(len(lags), np.nan)
     index = np.round(np.asarray(at)[:, np.newaxis]).astype(np.intp) + lags
     inside = (index >= 0) & (index < len(values))
-    found = np.where(inside, values[np.clip(index, 0, len(values) - 1)], np.nan)
-    return nanmean(found, axis=0)
+    values_around = np.where(inside, values[np.clip(index, 0, len(values) - 1)], np.nan)
+    return nanmean(values_around, axis=0)
 
 
 def _peak(values, curve=None):
     """The largest local maximum, between samples; of `curve`, by `values` there. None without."""
     curve = values if curve is None else curve
     inner = curve[1:-1]
-    found = np.flatnonzero((inner >= curve[:-2]) & (inner > curve[2:])) + 1
-    if not len(found):
+    maxima = np.flatnonzero((inner >= curve[:-2]) & (inner > curve[2:])) + 1
+    if not len(maxima):
         return None
-    return _between(curve, int(found[values[found].argmax()]))
+    return _between(curve, int(maxima[values[maxima].argmax()]))
 
 
 def _between(values, k):

@@ -90,9 +90,9 @@ class LivePhase(_Estimate):
         upper: Any = None,
         cycle: Any = None,
     ) -> Self:
-        found = super().__new__(cls, phase, rate, confidence, lower, upper)
-        found.cycle = cycle
-        return found
+        phases = super().__new__(cls, phase, rate, confidence, lower, upper)
+        phases.cycle = cycle
+        return phases
 
     def __repr__(self):
         return f"{super().__repr__()[:-1]}, cycle={self.cycle!r})"
@@ -145,13 +145,13 @@ class Session:
         self.time = time
         for sample in self._resampler.add(np.atleast_2d(frame), time):
             self._streams.update(sample)
-        found = self._streams.estimate(self._resampler.elapsed)
-        self._course.follow(time, found.phase, found.cycle)
+        phases = self._streams.estimate(self._resampler.elapsed)
+        self._course.follow(time, phases.phase, phases.cycle)
         if frame.ndim == 1:
-            found = each_value(found, lambda values: values[0].item())
-        self.history.append(found)
+            phases = each_value(phases, lambda values: values[0].item())
+        self.history.append(phases)
         # The history has arrays of its own.
-        return found if frame.ndim == 1 else each_value(found, np.copy)
+        return phases if frame.ndim == 1 else each_value(phases, np.copy)
 
     def time_left(self):
         """Frames of the training performances until the end of each stream, or of its cycle."""
@@ -353,9 +353,9 @@ class Streams:
         temperature = self.reference.interval_temperature * excess
         temperature *= (np.maximum(excess / _UNUSUAL, 1) / self._feature_share) ** 2
         bounds = cyclic_bounds if self.reference.cyclic else phase_bounds
-        found = bounds(gains[:, self._whole], temperature, self._phases[-1], self._last)
+        edges = bounds(gains[:, self._whole], temperature, self._phases[-1], self._last)
         half = self._last / 2 * self.reference.cyclic
-        return np.where(self._n_samples > 0, found, [[-half], [half]])
+        return np.where(self._n_samples > 0, edges, [[-half], [half]])
 
 
 class Resampler:
@@ -467,8 +467,9 @@ def stack_phases(phases):
     """The `LivePhase` of each frame as one of arrays."""
     if not phases:
         return LivePhase(*np.empty((5, 0)), cycle=np.empty(0, dtype=np.intp))
-    values = map(np.array, zip(*phases, strict=True))
-    return LivePhase(*values, cycle=np.array([found.cycle for found in phases]))
+    phase, rate, confidence, lower, upper = map(np.array, zip(*phases, strict=True))
+    cycle = np.array([each.cycle for each in phases])
+    return LivePhase(phase, rate, confidence, lower, upper, cycle)
 
 
 def gains_of(costs):
@@ -632,8 +633,8 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
     scale = 1.0 if frame_rate is None else frame_rate
     with np.errstate(over="ignore"):
         frames = stamps * scale
-        given = frames if after is None else np.concatenate([[after], frames])
-        steps = np.diff(given)
+        all_frames = frames if after is None else np.concatenate([[after], frames])
+        steps = np.diff(all_frames)
     finite = np.isfinite(frames)
     if not finite.all():
         i = int(finite.argmin())
@@ -641,7 +642,7 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
     wrong = (steps < SMALLEST) | (steps > LARGEST)
     if wrong.any():
         i = int(wrong.argmax())
-        before, now = given[i : i + 2] / scale
+        before, now = all_frames[i : i + 2] / scale
         by = f", by {SMALLEST:g} to {LARGEST:g} frames" if steps[i] > 0 else ""
         raise ValueError(
             f"{what}: time stamps must increase{by}, but {now:.10g} follows {before:.10g}. Leave "
@@ -664,9 +665,9 @@ def times_of_each(times, n):
     """A list with the times of each of n performances, or None for each without times."""
     if times is None:
         return [None] * n
-    given = len(times) if np.iterable(times) else "none"
-    if given != n:
+    count = len(times) if np.iterable(times) else "none"
+    if count != n:
         raise ValueError(
-            f"There must be one sequence of times for each performance, got {given} for {n}."
+            f"There must be one sequence of times for each performance, got {count} for {n}."
         )
     return list(times)
