@@ -106,7 +106,7 @@ def as_frames(frames, n_frames):
     return np.linspace(0, n_frames - 1, int(frames)).round().astype(int).tolist()
 
 
-def as_performances(X):
+def as_performances(X) -> list:
     """The performances of a collection, or a single one as a list."""
     collection = as_collection(X)
     if collection is not None and len(collection) == 0:

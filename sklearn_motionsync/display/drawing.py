@@ -60,6 +60,11 @@ def pyplot():
     return plt
 
 
+def empty_lists(n: int) -> list[list]:
+    """Lists that a plot fills with what it draws."""
+    return [[] for _ in range(n)]
+
+
 def panels(ax, cells, n_rows, n_cols, size, drawn=()):
     """A figure and its axes in some cells of a grid.
 

@@ -25,7 +25,7 @@ from ..inputs.types import (
 from ..matching.counting import first_largest
 from ..synchronizers.match import check_coverage
 from .arguments import AxesLike, labels_of_signals
-from .drawing import GroupCurves, group_styles, legend_above, signal_panels
+from .drawing import GroupCurves, empty_lists, group_styles, legend_above, signal_panels
 from .time_axis import TimeAxis, clock_rate, draw_keyframes, offset_label, text_of_keyframe
 
 __all__ = ["GroupDisplay", "display_of_groups"]
@@ -281,14 +281,13 @@ class GroupDisplay:
             axis.set_ylabel(label)
             axis.set_xlim(clock[0], clock[-1])
         timing.set_xlabel(self.axis.label)
-        self.dots_, self.clusters_, self.events_ = [], [], []
+        self.dots_, self.clusters_, self.events_ = empty_lists(3)
         if self.events is not None:
             self._draw_events()
         self._draw_dots(timing)
-        bars = [] if self.comparison is None else self._draw_clusters()
         handles = list(zip(self.bands_[0], self.means_[0], strict=True))
         labels = [group.label for group in self.groups]
-        if bars:
+        if self.comparison is not None and (bars := self._draw_clusters()):
             handles.append(bars[0])
             labels.append(f"differs, p at most {self.comparison.level:g}")
         legend_above(above, handles, labels, self.title, below=top, n_cols=1)

@@ -315,7 +315,7 @@ class PhaseDisplay:
         has_body = self.performances[0].body is not None
         # Two panels beside each other; an odd last one has the whole width.
         n_panels, count = has_body + 2 + len(self.features), len(self.performances)
-        places = [divmod(i, 2) for i in range(n_panels)]
+        places: list[tuple] = [divmod(i, 2) for i in range(n_panels)]
         if n_panels % 2:
             places[-1] = (n_panels // 2, slice(None))
         each = -(-n_panels // 2)
@@ -379,7 +379,7 @@ class PhaseDisplay:
             row.show(time)
 
 
-def _as_list_of_phases(phases):
+def _as_list_of_phases(phases) -> list[LivePhase]:
     """A list of LivePhase of arrays (n_frames_i,); streams side by side are separated."""
     listed = [phases] if isinstance(phases, LivePhase) else phases
     if not isinstance(listed, list) or not all(isinstance(of, LivePhase) for of in listed):

@@ -20,7 +20,7 @@ from ..synchronizers.match import rates_of
 from ..utils.groups import encode_groups
 from ..utils.pipelines import find_step, with_frame_rate
 from .arguments import AxesLike, labels_of_signals, undo_scaling
-from .drawing import WIDTH, GroupCurves, group_styles, legend_above, panels
+from .drawing import WIDTH, GroupCurves, empty_lists, group_styles, legend_above, panels
 from .time_axis import TimeAxis, draw_keyframes, keyframes_of_estimator
 
 __all__ = ["ActionModelDisplay"]
@@ -262,7 +262,7 @@ class ActionModelDisplay:
         cells = [divmod(i, n_cols) for i in range(count)]
         height = max(3, 1.9 * n_rows + 1.4) + 0.2 * max(len(self.groups) - 3, 0)
         self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, (WIDTH, height))
-        self.mean_, self.envelope_, self.performances_, self.departures_ = [], [], [], []
+        self.mean_, self.envelope_, self.performances_, self.departures_ = empty_lists(4)
         labels = labels_of_signals(self.feature_names, self.units)
         for i, (axis, label) in enumerate(zip(self.axes_, labels, strict=True)):
             self._draw_feature(axis, i)

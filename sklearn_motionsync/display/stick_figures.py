@@ -41,7 +41,7 @@ from .bodies import (
     project,
     read_positions,
 )
-from .drawing import COLORS, WIDTH, bone_lines, panels, stage
+from .drawing import COLORS, WIDTH, bone_lines, empty_lists, panels, stage
 from .limb_departures import draw_departures, split_at_synchronizer
 
 __all__ = ["SkeletonDisplay", "postures_at"]
@@ -177,9 +177,9 @@ class SkeletonDisplay:
             place_on_floor(read_positions(x, skeleton, i), skeleton, follow=True)
             for i, x in enumerate(as_performances(X))
         ]
-        frames = as_frames(frames, min(map(len, bodies)))
-        titles = [f"frame {frame}" for frame in frames]
-        display = cls(postures_at(frames, bodies), skeleton, titles)
+        shown = as_frames(frames, min(map(len, bodies)))
+        titles = [f"frame {frame}" for frame in shown]
+        display = cls(postures_at(shown, bodies), skeleton, titles)
         return display.plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
@@ -227,8 +227,8 @@ class SkeletonDisplay:
         if match is not None:
             warped = match.warp([x.reshape(len(x), -1) for x in bodies])
             scenes.append(list(warped.reshape(*warped.shape[:2], *bodies[0].shape[1:])))
-            titles, durations = ["as recorded", "aligned"], [[len(x) - 1 for x in bodies]]
-            durations.append([float(np.median(durations[0]))] * len(bodies))
+            titles, recorded = ["as recorded", "aligned"], [float(len(x) - 1) for x in bodies]
+            durations = [recorded, [float(np.median(recorded))] * len(bodies)]
         display = cls(scenes, skeleton, titles, durations=durations, labels=labels)
         return display.plot(ax, at=at, azimuth=azimuth)
 
@@ -498,7 +498,7 @@ class SkeletonDisplay:
             lines = [fill(line, _LINE_LENGTH) for line in self.heading.splitlines()]
             self.heading_ = self.figure_.suptitle("\n".join(lines), fontsize="medium")
         self._drawn, self._behind, self._bones = drawn, behind, self._bones_of_panels()
-        self.bones_, self.heads_, self.behind_, self.moments_ = [], [], [], []
+        self.bones_, self.heads_, self.behind_, self.moments_ = empty_lists(4)
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
             self._prepare(axis, len(scene))
             if at > 0:

@@ -31,6 +31,7 @@ from .drawing import (
     COLORS,
     WIDTH,
     curves,
+    empty_lists,
     front_line,
     group_styles,
     legend_above,
@@ -129,7 +130,7 @@ class SynchronizationDisplay:
 
     def __init__(
         self,
-        before: PerformancesLike,
+        before: Sequence[PerformanceLike],
         after: PerformancesLike,
         match: Match,
         axis: TimeAxis,
@@ -138,7 +139,7 @@ class SynchronizationDisplay:
         units: Mapping[str, str] | None = None,
         pattern: PerformanceLike | None = None,
         pattern_index: int | None = None,
-        groups: Labels | None = None,
+        groups: Sequence[object] | None = None,
         keyframes: NumbersLike | None = None,
         pattern_keyframes: ValuesLike | None = None,
         coverage: float | None = 0.9,
@@ -152,9 +153,9 @@ class SynchronizationDisplay:
         self.groups = None if groups is None else list(map(str, groups))
         self.keyframes = None if keyframes is None else np.asarray(keyframes, dtype=np.float64)
         self.pattern_keyframes = check_pattern_keyframes(pattern_keyframes, match.times.shape[1])
-        tells = coverage is not None and match.intervals is not None
-        self.intervals = np.asarray(match.interval(coverage)) if tells else None
-        self.doubtful = match.doubtful if tells else None
+        self.intervals = self.doubtful = None
+        if coverage is not None and match.intervals is not None:
+            self.intervals, self.doubtful = np.asarray(match.interval(coverage)), match.doubtful
 
     def __repr__(self):
         count = counted(len(self.before), "performance")
@@ -381,7 +382,7 @@ class SynchronizationDisplay:
             The display itself.
         """
         n_rows = len(self.feature_names)
-        cells = [(row, column) for row in range(n_rows) for column in (0, 1)]
+        cells: list[tuple] = [(row, column) for row in range(n_rows) for column in (0, 1)]
         cells += [(slice(n_rows, None), slice(None))] * bool(warps)
         styles = {} if self.groups is None else group_styles(self.groups)
         colors = [styles[group][0] for group in self.groups or ()] or COLORS["performance"]
@@ -414,7 +415,7 @@ class SynchronizationDisplay:
         if warps:
             self.intervals_ = self._draw_intervals(self.axes_[-1], clock, colors)
             self.warps_ = self._draw_warps(self.axes_[-1], clock, colors)
-        self.keyframes_, self.own_keyframes_ = [], []
+        self.keyframes_, self.own_keyframes_ = empty_lists(2)
         if keyframe_lines:
             self._draw_keyframes(colors)
         for axis in self.axes_:

@@ -34,7 +34,7 @@ from .arguments import (
     times_from_zero,
 )
 from .bodies import invert_postures
-from .drawing import COLORS, WIDTH, legend_above, panels
+from .drawing import COLORS, WIDTH, empty_lists, legend_above, panels
 from .limb_departures import bones_of_limbs, limb_of
 from .stick_figures import SkeletonDisplay, postures_at
 
@@ -187,26 +187,26 @@ class TrackingDisplay:
             raise ValueError(f"Give a MotionTracker, got {type(estimator).__name__}.")
         takes = Takes(estimator, X)
         i = as_index(take, len(takes.arrays), "take")
-        if times is not None:
-            (times,) = takes.select_times(times, [i], "takes")
+        stamps = None if times is None else takes.select_times(times, [i], "takes")
+        true = None
         if truth is not None:
-            truth = Takes(estimator, truth, "The truth").arrays
-            truth = one_each(truth, len(takes.arrays), "truth", "takes")[i]
+            true_takes = Takes(estimator, truth, "The truth").arrays
+            true = one_each(true_takes, len(takes.arrays), "truth", "takes")[i]
         method = estimator.smooth if smooth else estimator.track
-        (track,) = method(takes.select([i]), None if times is None else [times], projection)
+        (track,) = method(takes.select([i]), stamps, projection)
         n_frames, n_features = track.postures.shape
-        if truth is not None and np.shape(truth) != (n_frames, n_features):
+        if true is not None and np.shape(true) != (n_frames, n_features):
             raise ValueError(
-                f"The truth must have the shape {(n_frames, n_features)}, got {np.shape(truth)}."
+                f"The truth must have the shape {(n_frames, n_features)}, got {np.shape(true)}."
             )
         rate = 1.0 if estimator.frame_rate is None else estimator.frame_rate
         if names is None:
             names = names_of_features(None, estimator, n_features)
         display = cls(
             track,
-            truth=truth,
+            truth=true,
             observed=takes.arrays[i] if projection is None else None,
-            times=np.arange(n_frames) / rate if times is None else times,
+            times=np.arange(n_frames) / rate if stamps is None else stamps[0],
             n_frames=estimator.n_frames_,
             names=as_names(names, n_features, "names", "features"),
             unit="frames" if estimator.frame_rate is None else "seconds",
@@ -275,7 +275,7 @@ class TrackingDisplay:
         size = WIDTH, _PANEL * count + 0.6
         cells, before = [(i, 0) for i in range(count)], getattr(self, "axes_", ())
         self.figure_, self.axes_ = panels(ax, cells, count, 1, size, before)
-        self.estimates_, self.bands_, self.truths_, self.observed_ = [], [], [], []
+        self.estimates_, self.bands_, self.truths_, self.observed_ = empty_lists(4)
         for axis, k in zip(self.axes_, shown, strict=False):
             self._draw_feature(axis, k)
         self._draw_progress(*self.axes_[-2:])

@@ -207,11 +207,11 @@ class TrellisDisplay:
         self.ax_.set_ylabel(f"offset d of {self.names[1]} (frames)")
         outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
         handles, self.keyframes_ = [self.path_, self.warp_, outside], None
-        has_points = self.keyframes is not None and np.isfinite(self.keyframes).all(axis=1).any()
-        if keyframe_points and has_points:
+        points = self.keyframes if keyframe_points else None
+        if points is not None and np.isfinite(points).all(axis=1).any():
             (self.keyframes_,) = self.ax_.plot(
-                self.keyframes[:, 0],
-                self.keyframes[:, 1],
+                points[:, 0],
+                points[:, 1],
                 "o",
                 color="white",
                 markersize=7,
