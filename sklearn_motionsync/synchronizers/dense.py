@@ -25,7 +25,7 @@ from ..matching.anchors import add_ramps, pin
 from ..matching.costs import COSTS
 from ..matching.gaps import add_weights
 from ..matching.sharpening import Sharpener
-from ..matching.warps import normalise
+from ..matching.warps import normalise, sample
 from ..utils.parallel import one_blas_thread
 from .anchored import AnchoredSynchronizer
 from .gaps import with_confidence
@@ -463,6 +463,12 @@ class DenseSynchronizer(AnchoredSynchronizer):
         match = self._match(performances)
         self.interval_factor_ *= calibrated_factor(match, self.keyframes_, frames)
         return self
+
+    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
+        arrays, shares = self._for_warper(performances, keyframes, frame_rate)
+        times = np.maximum.accumulate(self._distances_and_times(arrays, shares)[1], axis=1)
+        return sample(performances, times, self.n_frames_)
 
     def _for_warper(self, trials, keyframes=None, frame_rate=None):
         """Trials as the warper takes them, and their key-frames as shares, or None."""
