@@ -155,8 +155,8 @@ def main():
     on_clock = paper.normalize(points)
     of_pattern = most_curved(on_clock[pattern], len(keyframes[0]))
     curved = [
-        same_moments(on_clock[pattern], of_pattern, x) * (len(own) - 1) / (P - 1)
-        for x, own in zip(on_clock, points, strict=True)
+        same_moments(on_clock[pattern], of_pattern, x) * (len(recorded) - 1) / (P - 1)
+        for x, recorded in zip(on_clock, points, strict=True)
     ]
     methods = {
         "linear": LinearSynchronizer(P, pattern).fit(points),

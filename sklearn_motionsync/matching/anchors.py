@@ -131,8 +131,11 @@ def first_meeting(times, keyframes):
     return np.where(np.isnan(keyframes), np.nan, met)
 
 
-def pin(times, keyframes, own, reach=_REACH):
+def pin(times, keyframes, own):
     """Warps through exact key-frames: what they miss is taken off, less and less beside them.
+
+    A correction fades by a Gaussian, and falls to 0 linearly at the key-frames beside and at both
+    ends.
 
     Parameters
     ----------
@@ -141,10 +144,6 @@ def pin(times, keyframes, own, reach=_REACH):
         Of the pattern, in frames, increasing.
     own : ndarray, shape (n_sequences, n_keyframes)
         Of each performance, in frames of the clock, increasing; NaN where one is not known.
-    reach : float, default=0.1
-        Standard deviation, as a share of the clip, of the Gaussian by which a correction fades. It
-        also falls to 0, linearly, at the key-frames beside and at both ends. Infinite for that
-        alone.
 
     Returns
     -------
@@ -160,7 +159,7 @@ def pin(times, keyframes, own, reach=_REACH):
         knots = np.concatenate([[0], at, [last]])
         for a, miss in enumerate(misses):
             hat = np.interp(frames, knots, np.arange(len(knots)) == a + 1)
-            sigma = max(reach * last, abs(miss) / _STEEPEST)
+            sigma = max(_REACH * last, abs(miss) / _STEEPEST)
             tau += miss * hat * np.exp(-0.5 * np.square((frames - at[a]) / sigma))
         # Between two key-frames a warp stays between their times.
         below = np.concatenate([[0], wanted])[np.searchsorted(at, frames, side="right")]

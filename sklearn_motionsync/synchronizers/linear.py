@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..inputs.validation import names_of_input
-from ..matching.anchors import first_meeting, pin
+from ..matching.anchors import first_meeting
 from ..matching.sizes import BATCH
 from ..matching.warps import even_slices, normalise, sample
 from ..utils.pipelines import MissingMetadata
@@ -95,16 +95,17 @@ class LinearSynchronizer(AnchoredSynchronizer):
 
     def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
         performances = with_confidence(performances, confidence)
-        shares = self._shares(performances, keyframes, frame_rate)
-        times = even_times(len(performances), self.n_frames_)
-        if shares is not None:
-            times = pin(times, self.keyframes_, shares * (self.n_frames_ - 1), reach=np.inf)
+        shares, n_frames = self._shares(performances, keyframes, frame_rate), self.n_frames_
+        if shares is None:
+            times = np.tile(np.arange(n_frames, dtype=np.float64), (len(performances), 1))
+        else:
+            times = piecewise_linear(self.keyframes_, shares * (n_frames - 1), n_frames)
         arrays, distances = list(self._without_gaps(performances)), np.empty(len(performances))
         for rows in even_slices(len(performances), BATCH):
             if shares is None:
-                warped = normalise(arrays[rows], self.n_frames_)
+                warped = normalise(arrays[rows], n_frames)
             else:
-                warped = sample(arrays[rows], times[rows], self.n_frames_)
+                warped = sample(arrays[rows], times[rows], n_frames)
             differences = np.square(warped - self.pattern_)
             distances[rows] = differences.sum(axis=(1, 2), dtype=np.float64)
         return Match(times, distances)
@@ -117,16 +118,31 @@ class LinearSynchronizer(AnchoredSynchronizer):
         keyframes = training.keyframes * (clock.n_frames - 1)
         # On the mean key-frames all performances are comparable, as on one clock.
         mean = np.maximum.accumulate(np.nanmean(keyframes, axis=0))
-        times = pin(even_times(*clock.positions.shape[:2]), mean, keyframes, reach=np.inf)
+        times = piecewise_linear(mean, keyframes, clock.n_frames)
         comparable = clock.unit(sample(training.trials, times, clock.n_frames))
         learnt = self._learnt(training, clock, pattern, comparable)
         of_pattern = keyframes_of_pattern(learnt["pattern_index_"], keyframes, clock.n_frames)
         return learnt | {"keyframes_": of_pattern}
 
 
-def even_times(n_trials, n_frames):
-    """The warps of linear normalisation: (n_trials, P)."""
-    return np.tile(np.arange(n_frames, dtype=np.float64), (n_trials, 1))
+def piecewise_linear(keyframes, of_trials, n_frames):
+    """The warps of straight lines between the key-frames that are known: (n_trials, P).
+
+    Parameters
+    ----------
+    keyframes : ndarray, shape (n_keyframes,)
+        Of the pattern, in frames of the clock, increasing; NaN where one is not known.
+    of_trials : ndarray, shape (n_trials, n_keyframes)
+        Those of the trials.
+    n_frames : int
+        ``P``.
+    """
+    frames, last = np.arange(n_frames), n_frames - 1
+    times = np.empty((len(of_trials), n_frames))
+    for tau, shown in zip(times, of_trials, strict=True):
+        known = np.isfinite(keyframes + shown)
+        tau[:] = np.interp(frames, [0, *keyframes[known], last], [0, *shown[known], last])
+    return times
 
 
 def keyframes_of_pattern(index, keyframes, n_frames):
@@ -145,8 +161,9 @@ def keyframes_of_pattern(index, keyframes, n_frames):
     -------
     ndarray, shape (n_keyframes,)
     """
-    own = np.full(keyframes.shape[1], np.nan) if index is None else keyframes[index]
-    common = np.where(np.isnan(own), np.nan, keyframes)
-    times = pin(even_times(len(keyframes), n_frames), own, common, reach=np.inf)
+    known = np.full(keyframes.shape[1], np.nan) if index is None else keyframes[index]
+    if np.isfinite(known).all():
+        return known
+    times = piecewise_linear(known, keyframes, n_frames)
     met = np.nanmedian(first_meeting(times, keyframes), axis=0)
-    return np.maximum.accumulate(np.where(np.isnan(own), met, own))
+    return np.maximum.accumulate(np.where(np.isnan(known), met, known))
