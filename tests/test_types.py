@@ -131,7 +131,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import *
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.io import keyframes_from_events, read_motion
-from sklearn_motionsync.metrics import SpreadScorer, least_squares, timing_error
+from sklearn_motionsync.metrics import FeatureHoldoutScorer, least_squares, timing_error
 X = list(np.random.RandomState(0).standard_normal((3, 20, 2)).cumsum(axis=1))
 tables = [pd.DataFrame(x) for x in X]
 sync = LinearSynchronizer().fit(X)
@@ -170,7 +170,7 @@ Skeleton(["hip", "knee"], [-1, 0], {"left_hip": "hip", "left_knee": ["knee"]}).c
 DirectionCosines(Skeleton.paper(), hidden="nan")
 FrameWise(sync)
 PartSynchronizer({"arm": [0], "leg": [1]}, synchronizer=DenseSynchronizer(n_frames=20))
-SpreadScorer("sobolev")(sync, X) + least_squares(np.stack(X), np.stack(X))
+FeatureHoldoutScorer(2)(sync, X) + least_squares(np.stack(X), np.stack(X))
 timing_error(sync.match(X).times, sync.match(X).times.tolist(), quantile=0.9)
 make_gait(2, takes=True).data[0].shape
 partial(read_motion, "trial.amc", asf="trial.asf")
@@ -214,7 +214,7 @@ Skeleton.paper(up="up")
 Skeleton.papers()
 DirectionCosines("paper").fit(X)
 JointPositions(Skeleton.paper(), "parent").fit(np.ones((3, 9, 45)))
-SpreadScorer("variance")(sync, X)
+FeatureHoldoutScorer("many")(sync, X)
 make_bending(frame_rate="50 Hz")
 read_motion("trial.c3d", ends="cut")
 synchronization_distances(X, cost="euclidean")

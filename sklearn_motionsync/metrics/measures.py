@@ -1,4 +1,4 @@
-"""How well performances are synchronised: timing errors, and the regularity of warps.
+"""How well performances are synchronised: timing errors, where the truth is known.
 
 Warps are the ``times`` of a `Match`: tau(p), shape (n_sequences, P), from 0 to P - 1, in frames of
 the common clock. They may decrease.
@@ -18,10 +18,7 @@ from ..matching.warps import evaluate_warps
 
 __all__ = [
     "group_timing_error",
-    "inverse_consistency",
     "keyframe_error",
-    "pause_share",
-    "roughness",
     "timing_error",
 ]
 
@@ -61,7 +58,9 @@ def timing_error(
     >>> timing_error([[0, 1.5, 2, 3]], [[0, 1, 1.5, 3]])
     0.25
     """
-    times, true_times = _as_warps_of_one_shape(times, true_times, "true_times")
+    times, true_times = _as_warps(times), _as_warps(true_times, "true_times")
+    if times.shape != true_times.shape:
+        raise ValueError(f"times {times.shape} and true_times {true_times.shape} differ in shape.")
     return _summary(np.abs(times - true_times), quantile)
 
 
@@ -177,92 +176,6 @@ def keyframe_error(
     return _summary(errors, quantile)
 
 
-# -- regularity of warps ------------------------------------------------------------------
-
-
-def pause_share(times: NumbersLike) -> float:
-    """Share of the steps of a warp that do not advance: ``mean [tau(p+1) <= tau(p) + 1e-9]``.
-
-    Parameters
-    ----------
-    times : array-like, shape (n_sequences, P)
-        Warps, from 0 to P - 1.
-
-    Returns
-    -------
-    float
-        A share from 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        If times are not all from 0 to P - 1.
-
-    Examples
-    --------
-    >>> from sklearn_motionsync.metrics import pause_share
-    >>> pause_share([[0, 0, 2, 3, 4]])
-    0.25
-    """
-    return float((np.diff(_as_warps(times)) <= _ROUNDING).mean())
-
-
-def roughness(times: NumbersLike) -> float:
-    """Root mean square of the second differences ``tau(p+1) - 2 tau(p) + tau(p-1)``.
-
-    Parameters
-    ----------
-    times : array-like, shape (n_sequences, P)
-        Warps, from 0 to P - 1.
-
-    Returns
-    -------
-    float
-        The root mean square, in frames of the clock; 0 on a clock of two frames.
-
-    Raises
-    ------
-    ValueError
-        If times are not all from 0 to P - 1.
-
-    Examples
-    --------
-    >>> from sklearn_motionsync.metrics import roughness
-    >>> roughness([[0, 0, 1, 3]])
-    1.0
-    """
-    changes = np.diff(_as_warps(times), 2)
-    return float(np.sqrt(np.square(changes).mean())) if changes.size else 0.0
-
-
-def inverse_consistency(times: NumbersLike, back: NumbersLike) -> float:
-    """Mean absolute error of warps composed with their inverses, ``mean |tau_mn(tau_nm(p)) - p|``.
-
-    Parameters
-    ----------
-    times, back : array-like, shape (n_sequences, P)
-        Warps from a base to sequences, and from each of these to the base.
-
-    Returns
-    -------
-    float
-        The error in frames of the clock.
-
-    Raises
-    ------
-    ValueError
-        If times are not all from 0 to P - 1, or differ in shape.
-
-    Examples
-    --------
-    >>> from sklearn_motionsync.metrics import inverse_consistency
-    >>> inverse_consistency([[0, 2, 3, 3.5, 4]], [[0, 1, 2, 3, 4]])
-    0.5
-    """
-    times, back = _as_warps_of_one_shape(times, back, "back")
-    return float(np.abs(evaluate_warps(back, times) - np.arange(times.shape[1])).mean())
-
-
 def _summary(errors, quantile):
     if quantile is None:
         return float(errors.mean())
@@ -292,13 +205,6 @@ def _as_warps(times, what="times") -> np.ndarray:
             f"got {times[i, p]:.10g} at frame {p}."
         )
     return np.clip(times, 0, last)
-
-
-def _as_warps_of_one_shape(times, reference, what) -> tuple[np.ndarray, np.ndarray]:
-    times, reference = _as_warps(times), _as_warps(reference, what)
-    if times.shape != reference.shape:
-        raise ValueError(f"times {times.shape} and {what} {reference.shape} differ in shape.")
-    return times, reference
 
 
 def _as_moments(moments, n_sequences) -> list[np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 from ..inputs.types import PerformancesLike
 from .spread import check_pair
 
-__all__ = ["AmplitudePhase", "amplitude_phase_variance"]
+__all__ = ["amplitude_phase_variance"]
 
 
 class AmplitudePhase(NamedTuple):
@@ -27,12 +27,6 @@ class AmplitudePhase(NamedTuple):
         ``R^2 = MSE_phase / MSE_total``; NaN if performances did not differ.
     constant : float
         ``C_R``: the ratio of the energies of the performances before and after warping.
-
-    Examples
-    --------
-    >>> from sklearn_motionsync.metrics import AmplitudePhase
-    >>> AmplitudePhase(amplitude=1.0, phase=3.0, total=4.0, phase_share=0.75, constant=1.0).phase
-    3.0
     """
 
     amplitude: float

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import deepcopy
 from numbers import Integral
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from sklearn import get_config
@@ -16,19 +16,13 @@ from ..inputs.keyframes import Keyframes
 from ..inputs.types import PerformancesLike, RandomState
 from ..matching.warps import normalise
 from ..utils.pipelines import accepted_params, route_to_synchronizer
-from .spread import least_squares, pairwise_correlation, sobolev_least_squares
+from .spread import least_squares
 
 __all__ = ["FeatureHoldoutScorer", "SpreadScorer"]
 
-_SPREADS = {
-    "least_squares": (least_squares, -1),
-    "sobolev": (sobolev_least_squares, -1),
-    "correlation": (pairwise_correlation, 1),
-}
-
 
 class _SynchronizerScorer(BaseEstimator):
-    """Base of the scorers: a measure of spread, and the metadata requests."""
+    """Base of the scorers: the metadata requests, and what is scored."""
 
     def get_metadata_routing(self):
         """The metadata that the scorer requests from cross-validation and searches.
@@ -96,19 +90,8 @@ class _SynchronizerScorer(BaseEstimator):
         # Key-frames that are given but neither requested nor declined are an error.
         return getattr(self, "_requests", {"keyframes": None})
 
-    def _measure(self):
-        """The measure, and its sign, with which greater scores are better."""
-        if not isinstance(self.spread, str) or self.spread not in _SPREADS:
-            raise ValueError(f"spread={self.spread!r} is unknown; use one of {list(_SPREADS)}.")
-        return _SPREADS[self.spread]
-
-    def _score(self, before, after):
-        measure, sign = self._measure()
-        return sign * measure(before, after)
-
     def _reach(self, estimator, X, params, uses=("match",)):
         """The synchronizer and the performances, at least two."""
-        self._measure()
         name = type(self).__name__
         hint = (
             f"; in cross_val_score and searches by metadata routing, sklearn.set_config("
@@ -128,11 +111,7 @@ class _SynchronizerScorer(BaseEstimator):
 class SpreadScorer(_SynchronizerScorer):
     """Scorer of a synchronizer, or a pipeline with one, by the spread of all features.
 
-    Parameters
-    ----------
-    spread : {"least_squares", "sobolev", "correlation"}, default="least_squares"
-        The measure; greater is better, so the first two are negated. "sobolev" depends
-        on ``n_frames``: compare it between equal ones.
+    The score is `least_squares`, negated, since greater scores are better.
 
     Notes
     -----
@@ -152,12 +131,6 @@ class SpreadScorer(_SynchronizerScorer):
     >>> scores.shape
     (2,)
     """
-
-    def __init__(
-        self, spread: Literal["least_squares", "sobolev", "correlation"] = "least_squares"
-    ) -> None:
-        self.spread = spread
-        self._measure()
 
     def __call__(
         self, estimator: BaseEstimator, X: PerformancesLike, y: object = None, **params: Any
@@ -191,7 +164,7 @@ class SpreadScorer(_SynchronizerScorer):
         """
         reached = self._reach(estimator, X, params)
         before = reached.synchronizer.normalize(reached.performances)
-        return self._score(before, reached.match().warp(reached.performances))
+        return -least_squares(before, reached.match().warp(reached.performances))
 
 
 class FeatureHoldoutScorer(_SynchronizerScorer):
@@ -204,15 +177,12 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
     or `group_timing_error` where the true moments are known.
 
     Features are divided into ``n_folds`` folds. For each fold a clone is fitted without it, to a
-    median pattern. Its warps are scored by the spread of the fold alone, which over-warping does
-    not reduce. The clones are given the key-frames of the performances that are scored, but for
-    those that none of these has.
+    median pattern. Its warps are scored by the spread of the fold alone, `least_squares` negated,
+    which over-warping does not reduce. The clones are given the key-frames of the performances that
+    are scored, but for those that none of these has.
 
     Parameters
     ----------
-    spread : {"least_squares", "sobolev", "correlation"}, default="least_squares"
-        The measure; greater is better, so the first two are negated. "sobolev" depends
-        on ``n_frames``: compare it between equal ones.
     n_folds : int, default=3
         At least 2, and at most the number of features.
     random_state : int, RandomState instance or None, default=0
@@ -234,14 +204,11 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
 
     def __init__(
         self,
-        spread: Literal["least_squares", "sobolev", "correlation"] = "least_squares",
         n_folds: int = 3,
         random_state: RandomState = 0,
     ) -> None:
-        self.spread = spread
         self.n_folds = n_folds
         self.random_state = random_state
-        self._measure()
 
     def __call__(
         self, estimator: BaseEstimator, X: PerformancesLike, y: object = None, **params: Any
@@ -306,7 +273,7 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
             )
             match = refitted.fit(seen, **fit_params).match(seen, **match_params)
             before = normalise(hidden, synchronizer.n_frames_)
-            scores.append(self._score(before, match.warp(hidden)))
+            scores.append(-least_squares(before, match.warp(hidden)))
         return float(np.mean(scores))
 
 

@@ -1,7 +1,6 @@
 """Spread: how much performances differ from each other after synchronising, as a share of before.
 
-`least_squares` and `sobolev_least_squares` are ratios of squares: where all differences are halved
-they are 0.25.
+They are ratios of squares: where all differences are halved they are 0.25.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from ..inputs.types import PerformancesLike
 __all__ = [
     "check_pair",
     "least_squares",
-    "pairwise_correlation",
     "sobolev_least_squares",
 ]
 
@@ -109,45 +107,6 @@ def sobolev_least_squares(before: PerformancesLike, after: PerformancesLike) -> 
     return float(new / old)
 
 
-def pairwise_correlation(before: PerformancesLike, after: PerformancesLike) -> float:
-    """Ratio of the correlations of pairs after and before: above 1 for a gain.
-
-    ``sum_{i != j} cc(y_i, y_j) / sum_{i != j} cc(x_i, x_j)``, where cc is the correlation over
-    time, features centred one by one and pooled. Correlations with a constant performance are 0.
-
-    Parameters
-    ----------
-    before, after : array-like, shape (n_sequences, P, n_features)
-        On one clock, linearly normalised and synchronised. NaN is what was hidden: it counts as
-        the mean of its feature over time.
-
-    Returns
-    -------
-    float
-        The ratio. 1 if both sums are 0; negative if the sum is negative before, and then not
-        comparable.
-
-    Raises
-    ------
-    ValueError
-        If they are not of one shape, infinite, or all NaN; or the sum is 0 before and not after.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sklearn_motionsync.metrics import pairwise_correlation
-    >>> x = np.array([[0, 1, 2.0], [0, 2, 1.0]])[:, :, None]
-    >>> pairwise_correlation(x, x[[0, 0]])
-    2.0
-    """
-    (x, x_rounding), (y, y_rounding) = check_pair(before, after)
-    old, new = _mean_correlation(x, x_rounding), _mean_correlation(y, y_rounding)
-    tolerance = np.finfo(np.float64).eps * x[0].size
-    if abs(old) <= tolerance:
-        return _without_spread_before(abs(new) <= tolerance, "uncorrelated")
-    return float(new / old)
-
-
 # -- checks and sums ----------------------------------------------------------------------
 
 
@@ -228,17 +187,3 @@ def _without_spread_before(none_after, what):
         f"The performances are {what} before and are not after: the ratio is not defined. "
         "Compare with performances that differ, such as normalize(X) of a synchronizer."
     )
-
-
-def _mean_correlation(z, tolerance):
-    # Relative to the first frame, so that constant sequences are exactly 0.
-    if np.isnan(z).any():
-        z = np.nan_to_num(z - nanmean(z, axis=1)[:, np.newaxis])
-    z = z - z[:, :1]
-    centred = (z - z.mean(axis=1, keepdims=True)).reshape(len(z), -1)
-    norms = np.linalg.norm(centred, axis=1)
-    moves = norms > tolerance * np.sqrt(centred.shape[1])
-    centred = centred[moves] / norms[moves, np.newaxis]
-    correlation = centred @ centred.T
-    pairs = len(z) * (len(z) - 1)
-    return correlation[~np.eye(len(centred), dtype=bool)].sum() / pairs

@@ -74,23 +74,6 @@ def keyframe_difference(times, keyframes, pattern, lengths, frame_rate=None):
     return np.mean(differences)
 
 
-def stops(times):
-    return np.mean([b <= a for tau in times for a, b in pairwise(tau)])
-
-
-def bending(times):
-    P = times.shape[1]
-    return np.sqrt(np.mean([(t[p + 1] - 2 * t[p] + t[p - 1]) ** 2
-                            for t in times for p in range(1, P - 1)]))  # fmt: skip
-
-
-def round_trip(times, back):
-    return np.mean([
-        abs(interpolate(b, at) - p)
-        for tau, b in zip(times, back, strict=True) for p, at in enumerate(tau)
-    ])  # fmt: skip
-
-
 def squared_distance(x, y):
     return sum(integral((x[:, k] - y[:, k]) ** 2) for k in range(x.shape[1]))
 
@@ -108,14 +91,6 @@ def velocity_ratio(before, after):
     def total(z):
         slopes = np.stack([np.gradient(x, axis=0) for x in z])
         return sum(squared_distance(x, slopes.mean(axis=0)) for x in slopes)
-
-    return total(after) / total(before)
-
-
-def correlation_ratio(before, after):
-    def total(z):
-        flat = [(x - x.mean(axis=0)).ravel() for x in z]
-        return sum(a @ b / np.sqrt((a @ a) * (b @ b)) for a in flat for b in flat if a is not b)
 
     return total(after) / total(before)
 
@@ -253,12 +228,8 @@ CASES = {
             for wrong in (0, -5, NAN, INF, [50, 50], [], "fast", 1j)
         ],
     ),
-    "pause_share": Case((WARPS,), stops, refusals(WRONG_WARPS, lambda t: (t,))),
-    "roughness": Case((WARPS,), bending, refusals(WRONG_WARPS, lambda t: (t,))),
-    "inverse_consistency": Case((WARPS, WARPS[::-1]), round_trip, wrong_pairs()),
     "least_squares": Case(CURVES, spread_ratio, CURVE_REFUSALS),
     "sobolev_least_squares": Case(CURVES, velocity_ratio, CURVE_REFUSALS),
-    "pairwise_correlation": Case(CURVES, correlation_ratio, CURVE_REFUSALS),
     "amplitude_phase_variance": Case(
         CURVES,
         decomposition,
