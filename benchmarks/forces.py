@@ -12,8 +12,8 @@ the events.
 
 A second table has the knee and the hip of 39 children (Ramsay and Silverman, from fdatools), each
 alone and both together: where the knee is bent and stretched most, and the hip stretched most. Its
-last columns are the shares of frames that stand still (rate below 0.1) and hurry (above 2). A third
-table judges the warps of each joint by the other joint, with one template. Prints Markdown.
+last columns are the shares of frames that stand still (rate below 0.1) and hurry (above 2). Prints
+Markdown.
 """
 
 import sys
@@ -158,44 +158,6 @@ def children_table():
         print(f"| {method} | " + " | ".join(cells) + " |", flush=True)
 
 
-def disagreement_table():
-    """Warps by one joint, by both, and through all moments: the moments, and what is left of each.
-
-    The last is the standard deviation between children, in the mean over frames, in degrees; every
-    angle less its own mean.
-    """
-    children = read_children()
-    moments = np.array([events_of_child(x) for x in children])
-    frames = np.arange(children.shape[1])
-    own = DenseSynchronizer().fit(list(children)).pattern_index_
-    through = [_knots(x, frames[-1]) for x in moments]
-    warps = {
-        "linear time normalisation": linear(children),
-        "`DenseSynchronizer()`, by the knee": dense(pattern=own)(children[:, :, 1:]),
-        "by the hip": dense(pattern=own)(children[:, :, :1]),
-        "by both": dense(pattern=own)(children),
-        "straight through the four moments": np.array(
-            [np.interp(frames, through[own], one) for one in through]
-        ),
-    }
-    print("\n| warps | moments of the knee | moment of the hip | left of the knee | of the hip |")
-    print("|---|---|---|---|---|")
-    centred = children - children.mean(axis=1, keepdims=True)
-    for name, times in warps.items():
-        *knee, hip = spreads_of(moments, times)
-        warped = [
-            [np.interp(tau, frames, y) for y in x.T] for tau, x in zip(times, centred, strict=True)
-        ]
-        left_hip, left_knee = np.std(warped, axis=0, ddof=1).mean(axis=1)
-        cells = [", ".join(f"{x:.2f}" for x in knee), f"{hip:.2f}"]
-        cells += [f"{left_knee:.1f}", f"{left_hip:.1f}"]
-        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
-
-
-def _knots(moments, last):
-    return np.concatenate([[0], np.sort(moments), [last]])
-
-
 def main():
     people = read_forces()
     print("| method | setting | first peak | valley | second peak | mean | last five people |")
@@ -215,7 +177,6 @@ def main():
                 f"| {method} | {setting} | {each} | {of_people.mean():.2f} | {held} |", flush=True
             )
     children_table()
-    disagreement_table()
 
 
 if __name__ == "__main__":

@@ -1,24 +1,16 @@
 """`read_motion` against parsers of a page of plain NumPy, for docs/speed.md.
 
-The plain ones believe every file: no checks, no messages, no encodings, no gaps. Both give the same
-positions, which is checked first; then they run in turns. Beside the files given, two BVH
-files of 31 joints are written, of 200 and of 20,000 frames.
+    python benchmarks/readers.py DATA_FOLDER
 
-    python benchmarks/readers.py ../shared/data/original_files/*/*.*
+The plain ones believe every file: no checks, no messages, no encodings, no gaps. Both give the same
+positions, which is checked first; then they run in turns on all files below original_files.
 """
 
-import os
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
-
-import argparse
 import statistics
-import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
+from harness import command_line, print_head, print_row
 from sklearn_motionsync.io import read_motion
 
 # -- the plain parsers ------------------------------------------------------------------
@@ -126,43 +118,11 @@ def plain_asf(path):
 
 PLAIN = {".bvh": plain_bvh, ".amc": plain_amc}
 
-# -- files ------------------------------------------------------------------------------
-
-# The parents of a body of 31 joints: legs, trunk and head, arms with fingers.
-BODY = [-1, 0, 1, 2, 3, 4, 0, 6, 7, 8, 9, 0, 11, 12, 13, 14, 15]
-BODY += [13, 17, 18, 19, 20, 21, 20, 13, 24, 25, 26, 27, 28, 27]
-
-
-def write_bvh(path, n_frames, seed=0):
-    """A file of the body, with channels as most programs write them."""
-    rng = np.random.default_rng(seed)
-    lines, open_joints = ["HIERARCHY"], []
-    for j, parent in enumerate(BODY):
-        while open_joints and open_joints[-1] != parent:
-            lines += close(open_joints.pop(), j)
-        offset = " ".join(f"{x:.6f}" for x in rng.uniform(-20, 20, 3))
-        position = "Xposition Yposition Zposition " * (parent < 0)
-        lines += [f"{'JOINT' if open_joints else 'ROOT'} joint_{j}", "{", f"OFFSET {offset}"]
-        lines += [f"CHANNELS {3 + 3 * (parent < 0)} {position}Zrotation Xrotation Yrotation"]
-        open_joints.append(j)
-    while open_joints:
-        lines += close(open_joints.pop(), len(BODY))
-    lines += ["MOTION", f"Frames: {n_frames}", "Frame Time: 0.008333"]
-    walks = np.cumsum(rng.standard_normal((n_frames, 3 + 3 * len(BODY))), axis=0)
-    lines += [" ".join([f"{x:.6f}" for x in row]) for row in (walks + 180) % 360 - 180]
-    path.write_text("\n".join(lines) + "\n")
-
-
-def close(j, n_before):
-    """The lines that end joint j, with an End Site where no joint follows in it."""
-    is_leaf = j not in BODY[:n_before]
-    return ["End Site", "{", "OFFSET 0.0 5.0 0.0", "}", "}"] if is_leaf else ["}"]
-
 
 # -- the table --------------------------------------------------------------------------
 
 
-def compare(path, rounds):
+def compare(path, rounds=15):
     """Milliseconds of both, median of the ratios with quartiles, and the largest difference."""
     plain = PLAIN[path.suffix.lower()]
     expected = plain(path)
@@ -180,44 +140,10 @@ def compare(path, rounds):
     return *map(statistics.median, zip(*times, strict=True)), ratios, expected.shape
 
 
-def against_loadtxt(path, rounds):
-    """The time of `read_motion` by that of `numpy.loadtxt` on the numbers alone, medians."""
-    n_before = path.read_bytes().partition(b"Frame Time")[0].count(b"\n") + 1
-    ratios = []
-    for _ in range(rounds):
-        start = time.process_time()
-        read_motion(path)
-        middle = time.process_time()
-        np.loadtxt(path, skiprows=n_before)
-        ratios.append((middle - start) / (time.process_time() - middle))
-    return statistics.median(ratios)
-
-
-def main():
-    """Print a table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("files", nargs="*", type=Path)
-    parser.add_argument("--rounds", type=int, default=15)
-    args = parser.parse_args()
-    files = [path for path in args.files if path.suffix.lower() in PLAIN]
-    print("| file | frames x joints | `read_motion`, ms | plain NumPy, ms | ratio |")
-    print("|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as folder:
-        for n_frames in (200, 20_000):
-            files.append(Path(folder) / f"made_{n_frames}.bvh")
-            write_bvh(files[-1], n_frames)
-        for path in files:
-            ours, plain, (low, ratio, high), shape = compare(path, args.rounds)
-            size = f"{shape[0]} x {shape[1]}"
-            print(
-                f"| {path.name} | {size} | {ours:.1f} | {plain:.1f} | "
-                f"{ratio:.2f} ({low:.2f} to {high:.2f}) |",
-                flush=True,
-            )
-        path = Path(folder) / "made_20000.bvh"
-        ratio = against_loadtxt(path, args.rounds)
-        print(f"\n{path.name}: {ratio:.2f} of the time of numpy.loadtxt")
-
-
 if __name__ == "__main__":
-    main()
+    folder = command_line(__doc__).parse_args().folder / "original_files"
+    print_head("file", ["frames x joints", "`read_motion`, ms", "plain NumPy, ms", "ratio"])
+    for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in PLAIN):
+        ours, plain, (low, ratio, high), shape = compare(path)
+        times = [f"{ours:.1f}", f"{plain:.1f}", f"{ratio:.2f} ({low:.2f} to {high:.2f})"]
+        print_row(path.name, [f"{shape[0]} x {shape[1]}", *times])

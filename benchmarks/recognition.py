@@ -1,23 +1,20 @@
 """Which action it is, of people not seen: the classifier, and other ways.
 
     pip install . aeon
-    python benchmarks/recognition.py DATA_FOLDER [actions] [rejected] [exercises]
+    python benchmarks/recognition.py DATA_FOLDER [actions] [rejected]
 
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect of the same form, with
 utkinect/utkinect_splits.json: ten halves of the actors to learn from, on which published results
-stand; and uiprmd/uiprmd_odd_positions.npz, exercises done right and wrong. Nothing of
-`ActionClassifier` is chosen here. Of every other way the best setting is shown, chosen by the
-result: view (cosines, positions or both), length and scale with the largest accuracy; and in a row
-of its own the best that any of their settings reaches, every number by itself. Ways of packages
-that are not installed are left out. Unknown actions are left out of the training in turn: the area
-under the curve of the novelty of all test clips, mean over splits and actions. Exercises are told
-right from wrong, of one subject after the other, by all trials of the others or by every second:
-the area under the curve of all subjects together. Prints Markdown.
+stand. Nothing of `ActionClassifier` is chosen here. Of every other way the best setting is shown,
+chosen by the result: view (cosines, positions or both), length and scale with the largest accuracy;
+and in a row of its own the best that any of their settings reaches, every number by itself. Ways of
+packages that are not installed are left out. Unknown actions are left out of the training in turn:
+the area under the curve of the novelty of all test clips, mean over splits and actions. Prints
+Markdown.
 
 A recognizer is bound to recordings and takes indices of them: what it learns from, and what it is
 asked about. Other ways are functions ``decide(train, test)`` that give classes and scores
-(n_test, n_classes), the larger the more like the class; `Scored` makes probabilities of scores
-with one temperature, learnt of people left out, and calls new what has no large score.
+(n_test, n_classes), the larger the more like the class; `Scored` calls new what has no large score.
 """
 
 import json
@@ -28,7 +25,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from exercises import read_exercises
 from harness import (
     command_line,
     percent,
@@ -39,8 +35,6 @@ from harness import (
     version_of,
 )
 from joblib import Parallel, delayed
-from scipy.optimize import minimize_scalar
-from scipy.special import log_softmax, softmax
 from sklearn.linear_model import RidgeClassifierCV
 from sklearn.metrics import roc_auc_score
 from sklearn.model_selection import LeaveOneGroupOut
@@ -102,18 +96,9 @@ class Classifier:
         """Actions of performances (n_test,)."""
         return self.learnt(train).predict(self._recordings.some(self._view, test))
 
-    def probabilities(self, train, test):
-        """Classes, and their probabilities (n_test, n_classes)."""
-        model = self.learnt(train)
-        return model.classes_, model.predict_proba(self._recordings.some(self._view, test))
-
     def novelty(self, train, test):
         """The larger, the less like any class (n_test,)."""
         return -self.learnt(train).score_samples(self._recordings.some(self._view, test))
-
-    def contrast(self, train, test):
-        """The larger, the more like the second of two classes (n_test,)."""
-        return self.learnt(train).decision_function(self._recordings.some(self._view, test))
 
     def learnt(self, train):
         """The classifier of some of the recordings."""
@@ -133,8 +118,7 @@ def classifier(recordings, view, n_frames):
 class Scored:
     """A recognizer of a function ``decide(train, test)``: classes, scores (n_test, n_classes)."""
 
-    def __init__(self, recordings, decide):
-        self._actions, self._actors = recordings.actions, recordings.actors
+    def __init__(self, decide):
         self._decide = decide
 
     def predict(self, train, test):
@@ -142,39 +126,9 @@ class Scored:
         classes, scores = self._decide(train, test)
         return classes[scores.argmax(axis=1)]
 
-    def probabilities(self, train, test):
-        """Classes, and their probabilities (n_test, n_classes)."""
-        classes, scores = self._decide(train, test)
-        return classes, softmax(self._slope(classes, train) * scores, axis=1)
-
     def novelty(self, train, test):
         """The larger, the less like any class (n_test,)."""
         return -self._decide(train, test)[1].max(axis=1)
-
-    def contrast(self, train, test):
-        """The larger, the more like the second of two classes (n_test,)."""
-        return np.diff(self._decide(train, test)[1], axis=1)[:, 0]
-
-    def _slope(self, classes, train):
-        """Of everybody in the training set, when the others are learnt from."""
-        scores = np.full((len(train), len(classes)), np.nan)
-        for known, held in LeaveOneGroupOut().split(train, groups=self._actors[train]):
-            seen, found = self._decide(train[known], train[held])
-            scores[np.ix_(held, np.searchsorted(classes, seen))] = found
-        # What nobody else does is thought of last.
-        scores = np.where(np.isnan(scores), np.nanmin(scores), scores)
-        return slope_of(scores, np.searchsorted(classes, self._actions[train]))
-
-
-def slope_of(scores, targets):
-    """One over the temperature: the factor of scores (n, n_classes) with the least log-loss."""
-    below = scores - scores.max(axis=1, keepdims=True)
-    unit, rows = np.abs(below).mean(), np.arange(len(targets))
-
-    def loss(logarithm):
-        return -log_softmax(np.exp(logarithm) / unit * below, axis=1)[rows, targets].mean()
-
-    return np.exp(minimize_scalar(loss, bounds=(-7, 7), method="bounded").x) / unit
 
 
 # -- dynamic time warping ---------------------------------------------------------------
@@ -201,7 +155,7 @@ def dtw(recordings, view, n_frames):
         return np.unique(labels), np.stack(each, axis=1)
 
     return {
-        NEAREST: {"": Scored(recordings, nearest)},
+        NEAREST: {"": Scored(nearest)},
         DTW_SVM: {"": machines(recordings, partial(kernel_of, D))},
     }
 
@@ -224,7 +178,7 @@ def machines(recordings, kernel):
         ]
         return np.unique(labels), np.stack(each, axis=1)
 
-    return Scored(recordings, decide)
+    return Scored(decide)
 
 
 # -- what does not warp -----------------------------------------------------------------
@@ -275,7 +229,7 @@ def rocket(recordings, view, n_frames):
         # Of two classes the library gives one column.
         return pipe.classes_, scores if scores.ndim > 1 else np.column_stack([-scores, scores])
 
-    return {ROCKET: {"": Scored(recordings, decide)}}
+    return {ROCKET: {"": Scored(decide)}}
 
 
 # -- all of them ------------------------------------------------------------------------
@@ -318,38 +272,19 @@ def actors_left_out(actors):
     return list(LeaveOneGroupOut().split(actors, groups=actors))
 
 
-def actors_alone(actors):
-    """Folds (train, test) with an actor each to learn from."""
-    return [(alone, others) for others, alone in actors_left_out(actors)]
-
-
 # -- what is found on a fold ------------------------------------------------------------
 
-SPLITS, LEFT_OUT, ALONE = "ten splits", "leave one subject out", "learn from one subject"
-LOSS, ERROR, AREA = "log-loss", "ECE", "AUC of unknown actions"
+SPLITS, LEFT_OUT, AREA = "ten splits", "leave one subject out", "AUC of unknown actions"
 
 
 def examine_split(recognizer, recordings, train, test):
     """{figure: values} of everything that is told of a split."""
     actions = recordings.actions
-    classes, probabilities = recognizer.probabilities(train, test)
-    right = classes[probabilities.argmax(axis=1)] == actions[test]
-    true = probabilities[np.arange(len(test)), np.searchsorted(classes, actions[test])]
-    loss = -np.log(np.maximum(true, np.finfo(float).eps)).mean()
-    error = calibration_error(probabilities.max(axis=1), right)
+    classes = np.unique(actions[train])
     return {
-        SPLITS: [right.mean()],
-        LOSS: [loss],
-        ERROR: [error],
+        SPLITS: [np.mean(recognizer.predict(train, test) == actions[test])],
         AREA: [unknown_area(recognizer, actions, action, train, test) for action in classes],
     }
-
-
-def calibration_error(confidence, right, n_bins=10):
-    """How far shares of right answers are from confidence: mean over bins, by their counts."""
-    bins = np.minimum((confidence * n_bins).astype(int), n_bins - 1)
-    apart = [np.abs(np.sum((confidence - right)[bins == i])) for i in range(n_bins)]
-    return np.sum(apart) / len(right)
 
 
 def unknown_area(recognizer, actions, action, train, test):
@@ -415,14 +350,7 @@ SPLIT_COLUMNS = [
     (f"{SPLITS}, mean", SPLITS, np.mean, to_tenth, max),
     ("worst split", SPLITS, np.min, to_tenth, max),
     (LEFT_OUT, LEFT_OUT, np.mean, to_tenth, max),
-    (LOSS, LOSS, np.mean, three_digits, min),
-    (ERROR, ERROR, np.mean, three_digits, min),
     (AREA, AREA, np.nanmean, three_digits, max),
-]
-FOLD_COLUMNS = [
-    (LEFT_OUT, LEFT_OUT, np.mean, to_tenth, max),
-    (ALONE, ALONE, np.mean, to_tenth, max),
-    (f"{ALONE}, worst", ALONE, np.min, to_tenth, max),
 ]
 
 
@@ -500,71 +428,13 @@ def rejection_table(recordings, splits, name):
         print_row(kind, [to_tenth(rejected), f"{np.mean(areas):.2f}" if areas else "-"])
 
 
-# -- exercises done right and wrong -----------------------------------------------------
-
-
-def exercise_recordings(folder):
-    """Of each exercise, whether a trial is done right is its action."""
-    for name, trials, actors, right, _ in read_exercises(folder):
-        trials = [np.asarray(x) for x in trials]
-        yield Recordings(str(name), {COSINES: trials}, np.asarray(right).astype(int), actors)
-
-
-def every_second(recordings):
-    """Whether a trial is the first, third, fifth ... of its subject and kind (n,)."""
-    chosen = np.zeros(len(recordings.actors), dtype=bool)
-    for actor in np.unique(recordings.actors):
-        for action in np.unique(recordings.actions):
-            own = (recordings.actors == actor) & (recordings.actions == action)
-            chosen[np.flatnonzero(own)[::2]] = True
-    return chosen
-
-
-def judged_exercise(recognizer, recordings, learnt):
-    """Area under the curve, of all subjects, each judged by the learnt trials of the others."""
-    scores = np.empty(len(recordings.actors))
-    for train, test in actors_left_out(recordings.actors):
-        scores[test] = recognizer.contrast(train[learnt[train]], test)
-    return roc_auc_score(recordings.actions, scores)
-
-
-def exercise_table(every, name, choose):
-    """Of all exercises, by trials that ``choose(recordings)`` tells to learn from."""
-    makers = {CLASSIFIER: partial(Classifier, view=COSINES)}
-    if version_of("aeon") is not None:
-        for n_frames in (50, 100):
-            way = f"{ROCKET}, {n_frames} frames"
-            makers[way] = lambda recordings, n=n_frames: rocket(recordings, COSINES, n)[ROCKET][""]
-    print_head(f"right against wrong, {name}", makers)
-    found = []
-    for recordings in every:
-        learnt = choose(recordings)
-        areas = [judged_exercise(make(recordings), recordings, learnt) for make in makers.values()]
-        print_row(recordings.name, map(three_digits, areas))
-        found.append(areas)
-    print_row("mean", map(three_digits, np.mean(found, axis=0)))
-
-
-def exercise_tables(every):
-    """By all trials, and by every second."""
-    every = list(every)
-    exercise_table(every, "learnt from all trials", lambda some: np.ones(len(some.actors), bool))
-    exercise_table(every, "learnt from every second trial", every_second)
-
-
 # -- all of it --------------------------------------------------------------------------
 
 
-def action_tables(kinect, optical, splits):
-    """Of clips with splits of their actors, and of clips of few actors."""
-    left_out = partial(examine_fold, LEFT_OUT)
-    tasks = [(examine_split, splits), (left_out, actors_left_out(kinect.actors))]
+def action_table(kinect, optical, splits):
+    tasks = [(examine_split, splits)]
+    tasks.append((partial(examine_fold, LEFT_OUT), actors_left_out(kinect.actors)))
     recognition_table(kinect.name, examine_all(kinect, tasks), SPLIT_COLUMNS)
-    tasks = [
-        (left_out, actors_left_out(optical.actors)),
-        (partial(examine_fold, ALONE), actors_alone(optical.actors)),
-    ]
-    recognition_table(optical.name, examine_all(optical, tasks), FOLD_COLUMNS)
 
 
 def rejection_tables(kinect, optical, splits):
@@ -583,13 +453,11 @@ def read(folder):
     return kinect, optical, splits
 
 
-TABLES = {
-    "actions": lambda folder: action_tables(*read(folder)),
-    "rejected": lambda folder: rejection_tables(*read(folder)),
-    "exercises": lambda folder: exercise_tables(exercise_recordings(folder)),
-}
-
 if __name__ == "__main__":
     command = command_line(__doc__)
     print_versions("scipy", "scikit-learn", "aeon")
-    run_tables(TABLES, command)
+    tables = {
+        "actions": lambda folder: action_table(*read(folder)),
+        "rejected": lambda folder: rejection_tables(*read(folder)),
+    }
+    run_tables(tables, command)

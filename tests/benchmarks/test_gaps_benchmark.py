@@ -1,4 +1,4 @@
-"""Gaps of people: what the benchmark cuts, its peer, and how far key moments are missed."""
+"""Gaps of people: what the benchmark cuts, and how far key moments are missed."""
 
 import numpy as np
 import pytest
@@ -19,35 +19,6 @@ def test_runs_have_the_share_and_the_length(gaps):
     assert abs(mask.sum() / len(starts) - 6) < 0.3
 
 
-def test_arow_of_whole_curves_is_dtw(gaps):
-    rng = np.random.default_rng(1)
-    cost = rng.random((gaps.P, gaps.P, 2))
-    found = gaps.paths_of(cost)
-    for pair in range(2):
-        total = np.full((gaps.P + 1, gaps.P + 1), np.inf)
-        total[0, 0] = 0
-        for p in range(gaps.P):
-            for q in range(gaps.P):
-                before = min(total[p, q], total[p, q + 1], total[p + 1, q])
-                total[p + 1, q + 1] = cost[p, q, pair] + before
-        p = q = gaps.P
-        met = {i: [] for i in range(gaps.P)}
-        while p and q:
-            met[p - 1].append(q - 1)
-            ways = {(1, 1): total[p - 1, q - 1], (1, 0): total[p - 1, q], (0, 1): total[p, q - 1]}
-            a, b = min(ways, key=ways.get)
-            p, q = p - a, q - b
-        expected = [np.mean(met[i]) for i in range(gaps.P)]
-        np.testing.assert_allclose(found[pair], expected)
-
-
-def test_arow_does_not_pause_where_nothing_is_seen(gaps):
-    cost = np.random.default_rng(2).random((gaps.P, gaps.P, 1))
-    cost[40:50] = np.nan
-    found = gaps.paths_of(cost)[0]
-    np.testing.assert_allclose(np.diff(found[40:50]), 1)
-
-
 @pytest.mark.filterwarnings("ignore:Matching leaves")
 def test_key_moments_of_people_are_missed_as_without_gaps(gaps, real_data):
     kept = {"depositFloorR", "grabHighR", "jogLeftCircle4StepsRstart", "pickUp", "standUp"}
@@ -55,11 +26,11 @@ def test_key_moments_of_people_are_missed_as_without_gaps(gaps, real_data):
     actions = gaps.read_actions(real_data, events)
     people = [gaps.People(action, patterns=3) for action in actions]
     ways = {name: gaps.WAYS[name] for name in ("as they are", "mean")}
-    how = {"spaces": ("cosines",), "peer": False}
-    found = gaps.compare(people, actions, None, 0, {"": gaps.as_they_are}, **how)
+    spaces = ("cosines",)
+    found = gaps.compare(people, actions, None, 0, {"": gaps.as_they_are}, spaces)
     (whole,) = found.values()
     for kind in gaps.KINDS:
-        found = gaps.compare(people, actions, kind, 0, ways, **how)
+        found = gaps.compare(people, actions, kind, 0, ways, spaces)
         own, mean = (np.mean(found[name, "cosines"] / whole) for name in ways)
         assert own < 1.1
         # A limb of a third of the clips changes the mean of all errors by less than chance.

@@ -76,60 +76,16 @@ def test_leave_one_actor_out_splits(recognition):
         (train.tolist(), test.tolist()) for train, test in recognition.actors_left_out(actors)
     ]
     assert left_out == [([0, 2, 3], [1]), ([1, 3], [0, 2]), ([0, 1, 2], [3])]
-    alone = [(train.tolist(), test.tolist()) for train, test in recognition.actors_alone(actors)]
-    assert alone == [(test, train) for train, test in left_out]
 
 
 # -- figures ----------------------------------------------------------------------------
-
-
-def test_calibration_error_equals_hand_computation(recognition):
-    right = np.array([True, False, True, True, False])
-    confidence = np.array([0.95, 0.95, 0.65, 0.65, 0.3])
-    # Two bins of two are 0.45 and 0.35 off, one of one 0.3; 1 belongs to the last bin.
-    expected = (2 * 0.45 + 2 * 0.35 + 0.3) / 5
-    assert recognition.calibration_error(confidence, right) == pytest.approx(expected)
-    assert recognition.calibration_error(np.ones(4), np.ones(4, dtype=bool)) == 0
-
-
-@pytest.mark.parametrize("unit", [1e-6, 1, 1e4])
-def test_temperature_recovers_probabilities(recognition, unit):
-    # Two classes, scores that differ by 1, the larger right in 9 of 10: the odds are 9.
-    scores = unit * np.tile([0.0, 1.0], (10, 1))
-    slope = recognition.slope_of(scores + 5 * unit, np.repeat([0, 1], [1, 9]))
-    assert slope * unit == pytest.approx(np.log(9), rel=1e-3)
-
-
-def test_temperature_is_fitted_on_held_out_subjects(recognition, recordings):
-    decide = Nearest(np.arange(18.0), recordings.actions)
-    one = recognition.Scored(recordings, decide)
-    train, test = np.flatnonzero(recordings.actors != "s02"), np.array([1, 4, 7, 10])
-    classes, probabilities = one.probabilities(train, test)
-    assert classes.tolist() == ["bending", "rising", "sinking"]
-    np.testing.assert_allclose(probabilities.sum(axis=1), 1)
-    assert decide.seen[0] == (set(train), set(test))
-    for known, held in decide.seen[1:]:
-        assert known | held == set(train)
-        assert not set(recordings.actors[[*known]]) & set(recordings.actors[[*held]])
-    assert len(decide.seen) == 3
-    predicted = one.predict(train, test)
-    np.testing.assert_array_equal(predicted, classes[probabilities.argmax(axis=1)])
-
-
-def test_class_of_the_held_out_subject_alone_ranks_last(recognition, recordings):
-    actions = np.where(np.arange(18) == 0, "alone", recordings.actions)
-    strange = recognition.Recordings("few", recordings.views, actions, recordings.actors)
-    one = recognition.Scored(strange, Nearest(np.arange(18.0), strange.actions))
-    classes, probabilities = one.probabilities(np.arange(18), np.arange(3))
-    assert classes.tolist() == ["alone", "bending", "rising", "sinking"]
-    assert np.isfinite(probabilities).all()
 
 
 def test_auc_of_an_unknown_action(recognition, recordings):
     values = np.array([0.0, 0, 0, 0, 0, 0, 9, 9, 9, 9, 9, 9])
     decide = Nearest(values, recordings.actions)
     one, (train, test) = (
-        recognition.Scored(recordings, decide),
+        recognition.Scored(decide),
         (np.arange(0, 12, 2), np.arange(1, 12, 2)),
     )
     args = one, recordings.actions, "rising", train, test
@@ -161,50 +117,10 @@ def test_benchmarked_pipeline_is_that_of_the_manual(recognition, bunch, recordin
     pipe = make_pipeline(views.set_output(transform="pandas"), ActionClassifier())
     groups = bunch.actor[train]
     pipe.fit([bunch.data[i] for i in train], bunch.target[train], actionclassifier__groups=groups)
-    expected = pipe.predict_proba([bunch.data[i] for i in test])
+    expected = -pipe.score_samples([bunch.data[i] for i in test])
     one = recognition.Classifier(recordings, recognition.BOTH)
-    np.testing.assert_allclose(one.probabilities(train, test)[1], expected, rtol=1e-6)
+    np.testing.assert_allclose(one.novelty(train, test), expected, rtol=1e-6)
     np.testing.assert_array_equal(one.predict(train, test), bunch.target[test])
-
-
-# -- exercises --------------------------------------------------------------------------
-
-
-class Alike:
-    """A contrast of one number a clip."""
-
-    def __init__(self, values):
-        self.values, self.seen = values, []
-
-    def contrast(self, train, test):
-        self.seen.append(train.tolist())
-        return self.values[test]
-
-
-def test_an_exercise_is_judged_by_other_subjects(recognition):
-    actors, right = np.repeat(["a", "b", "c"], 4), np.tile([1, 0, 1, 0], 3)
-    recordings = recognition.Recordings("one", {}, right, actors)
-    some = recognition.every_second(recordings)
-    np.testing.assert_array_equal(some, np.tile([True, True, False, False], 3))
-    # In one of 36 pairs of a right and a wrong trial the wrong one has more.
-    values = np.array([9, 1, 8, 4.5, 7, 2, 6, 3, 5, 1, 4, 0])
-    judge = Alike(values)
-    found = recognition.judged_exercise(judge, recordings, some)
-    assert found == pytest.approx(1 - 1 / 36)
-    assert judge.seen == [[4, 5, 8, 9], [0, 1, 8, 9], [0, 1, 4, 5]]
-
-
-def test_contrast_is_of_the_second_class(recognition, recordings):
-    right = (recordings.actions == "bending").astype(int)
-    some = recognition.Recordings("bend", recordings.views, right, recordings.actors)
-    train, test = np.flatnonzero(some.actors != "s03"), np.flatnonzero(some.actors == "s03")
-    decide = Nearest(np.where(right == 1, 5.0, 2.0), right)
-    for recognizer in (
-        recognition.Scored(some, decide),
-        recognition.Classifier(some, recognition.COSINES),
-    ):
-        found = recognizer.contrast(train, test)
-        assert found[right[test] == 1].min() > found[right[test] == 0].max()
 
 
 # -- tables -----------------------------------------------------------------------------
@@ -227,17 +143,13 @@ def test_all_tables_of_a_tiny_set_without_peers(recognition, recordings, capsys,
         recordings.actions[two],
         recordings.actors[two],
     )
-    right = (recordings.actions == "bending").astype(int)
-    every = [recognition.Recordings("bend", recordings.views, right, recordings.actors)]
     with threadpool_limits(1), parallel_config(backend="sequential"):
-        recognition.action_tables(recordings, few, splits)
+        recognition.action_table(recordings, few, splits)
         recognition.rejection_tables(recordings, few, splits)
-        recognition.exercise_tables(every)
     tables = capsys.readouterr().out.strip().split("\n\n")
     rows = [[line.strip("| ").split(" | ") for line in table.splitlines()] for table in tables]
     for head, _, *body in rows:
         assert {len(row) for row in body} == {len(head)}
-    assert [len(body) - 2 for body in rows] == [3, 3, 8, 8, 8, 2, 2]
-    assert [row[0] for row in rows[5][2:]] == ["bend", "mean"]
+    assert [len(body) - 2 for body in rows] == [3, 8, 8, 8]
     ours = {row[0]: row[1:] for row in rows[0][2:]}["`ActionClassifier`, cosines"]
     assert ours[:3] == ["100.0"] * 3
