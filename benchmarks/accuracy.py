@@ -358,25 +358,18 @@ def refinement_cases(folder):
         name = f"make_bending, style {style:g}"
         yield name, points, "median", lambda times, n, b=bunch: group_timing_error(times, b.times)
     for one in read_people(folder):
-        everyone = np.arange(len(one.X))
-        for n_features in (None, 3, 2, 1):
-            some = "" if n_features is None else f", first {n_features} feature(s)"
-            X = [x[:, :n_features] for x in one.X]
-            yield f"`{one.name}`{some}", X, "median", error_of_events(one, everyone)
-        for actor in sorted(set(one.actors)) if one.archive == "hdm05" else ():
-            own = np.flatnonzero(one.actors == actor)
-            X = [one.X[i] for i in own]
-            if len(own) > 2:
-                yield f"`{one.name}`, subject {actor} alone", X, "median", error_of_events(one, own)
+        yield f"`{one.name}`", one.X, "median", error_of_events(one)
+        if one.name == "walk":
+            first = [x[:, :1] for x in one.X]
+            yield "`walk`, first feature", first, "median", error_of_events(one)
 
 
-def error_of_events(one, chosen):
-    """The mean error over the events of an action, of chosen clips to one of them, or NaN."""
+def error_of_events(one):
+    """The mean error over the events of an action, of all clips to one of them, or NaN."""
 
     def error(times, n):
         found = []
-        for moments in one.moments.values():
-            at = moments[chosen]
+        for at in one.moments.values():
             landed = np.array([np.interp(at[n], np.arange(P), tau) for tau in times])
             found.append(np.delete(np.abs(landed - at), n))
         found = np.concatenate(found)

@@ -1,6 +1,6 @@
 """What `find_departures` says of faults that were put into trials of people held out.
 
-    python benchmarks/departures.py DATA_FOLDER [--all]
+    python benchmarks/departures.py DATA_FOLDER [hdm05] [uiprmd]
 
 DATA_FOLDER holds hdm05/hdm05_positions.npz and uiprmd/uiprmd_odd_positions.npz. Every subject of
 each class is held out in turn; everything is learnt from right trials of the others. Three trials
@@ -9,14 +9,8 @@ fault. A limb is turned about its upper joint, with all below it. Eight kinds: o
 degrees off in 40 % of the time, a forearm or shank 30, the trunk 20; a limb late by 12 % of the
 time, or with 0.5 or 1.6 times its amplitude. What is judged is the most important row, whatever its
 evidence; overlap is that of the time, of faults with the right region. Choices were made on HDM05
-and two exercises of UI-PRMD; ``--all`` gives the other three as well. Prints Markdown, in per cent.
+and these two exercises of UI-PRMD. Prints Markdown, in per cent.
 """
-
-import os
-import sys
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
 
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from exercises import LANDMARKS, OTHER_SIDE
+from harness import command_line, percent, print_head, print_row, run_tables
 from scipy.spatial.transform import Rotation
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -42,7 +37,6 @@ from sklearn_motionsync.datasets import load_performances
 P = 60
 BODY = Skeleton.paper()
 CHOSEN = ("inline lunge", "shoulder rotation")
-UNSEEN = ("deep squat", "shoulder abduction", "sit to stand")
 # Most trials of a subject that get faults.
 SPOILT = 4
 # Upper and lower joint, what is below the lower one, and the part of the body.
@@ -308,34 +302,22 @@ def measure(classes):
     return found
 
 
-def print_table(title, found):
-    print(f"\n| {title} | region | limb | overlap | late told | rare found | rare, untouched |")
-    print("|---|---|---|---|---|---|---|")
-    for way, said in found.items():
-        table = pd.DataFrame(said)
+def fault_table(title, classes):
+    columns = ["region", "limb", "overlap", "late told", "rare found", "rare, untouched"]
+    print_head(title, columns)
+    found = {way: pd.DataFrame(said) for way, said in measure(classes).items()}
+    for way, table in found.items():
         faults, right = table[table["kind"].notna()], table[table["kind"].isna()]
-        late = faults[faults["kind"] == "late"]["told"] == "late"
-        print(
-            f"| {way} | {100 * faults['region'].mean():.0f} | {100 * faults['limb'].mean():.0f} | "
-            f"{faults['overlap'].mean():.2f} | {100 * late.mean():.0f} | "
-            f"{100 * faults['rare'].mean():.0f} | "
-            f"{100 * right['rare'].mean() if len(right) else np.nan:.1f} |"
-        )
-    print(f"\n| {title}, region (limb) | " + " | ".join(KINDS) + " |")
-    print("|---|" + "---|" * len(KINDS))
-    for way, said in found.items():
-        by_kind = pd.DataFrame(said).groupby("name")[["region", "limb"]].mean() * 100
-        cells = [f"{by_kind.region[k]:.0f} ({by_kind.limb[k]:.0f})" for k in KINDS]
-        print(f"| {way} | " + " | ".join(cells) + " |")
-    sys.stdout.flush()
+        late = faults["told"][faults["kind"] == "late"] == "late"
+        cells = [percent(faults["region"].mean()), percent(faults["limb"].mean())]
+        cells += [f"{faults['overlap'].mean():.2f}", percent(late.mean())]
+        print_row(way, [*cells, percent(faults["rare"].mean()), percent(right["rare"].mean(), 1)])
 
 
-def main(folder, is_all=False):
-    print_table("HDM05", measure(classes_of_hdm05(folder)))
-    print_table(" and ".join(CHOSEN), measure(exercises_of_uiprmd(folder, CHOSEN)))
-    if is_all:
-        print_table(" and ".join(UNSEEN), measure(exercises_of_uiprmd(folder, UNSEEN)))
-
+TABLES = {
+    "hdm05": lambda folder: fault_table("HDM05", classes_of_hdm05(folder)),
+    "uiprmd": lambda folder: fault_table(" and ".join(CHOSEN), exercises_of_uiprmd(folder, CHOSEN)),
+}
 
 if __name__ == "__main__":
-    main(sys.argv[1], "--all" in sys.argv[2:])
+    run_tables(TABLES, command_line(__doc__))

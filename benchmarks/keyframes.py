@@ -58,37 +58,10 @@ def piecewise_linear(X, at, template, others, of_others):
     return sync.match(others, keyframes=own_frames(of_others, others)).times
 
 
-def in_pieces(X, at, template, others, of_others):
-    """The part before the moment and the part after it, each matched by itself."""
-    out = np.empty((len(others), P))
-    for late in (False, True):
-        pieces = [piece(x, moment, late) for x, moment in zip(X, at, strict=True)]
-        moved = [piece(x, moment, late) for x, moment in zip(others, of_others, strict=True)]
-        times = DenseSynchronizer(P, pattern=template).fit(pieces).match(moved).times
-        for row, tau, moment in zip(out, times, of_others, strict=True):
-            own, met = (ends(moment, late) for moment in (at[template], moment))
-            inside = (own[0] <= FRAMES) & (own[1] >= FRAMES)
-            share = (FRAMES[inside] - own[0]) / (own[1] - own[0]) * (P - 1)
-            row[inside] = met[0] + np.interp(share, FRAMES, tau) / (P - 1) * (met[1] - met[0])
-    return out
-
-
-def ends(moment, late):
-    return (moment, P - 1) if late else (0, moment)
-
-
-def piece(x, moment, late):
-    """The part of a clip before or after a moment, at as many frames as the clip has."""
-    first, last = (k / (P - 1) * (len(x) - 1) for k in ends(moment, late))
-    at = np.linspace(first, last, max(8, round(last - first) + 1))
-    return np.stack([np.interp(at, np.arange(len(x)), column) for column in x.T], axis=1)
-
-
 METHODS = {
     "nothing": nothing,
     "exact": anchored(0),
     "`keyframe_std=3`": anchored(3),
-    "each piece by itself": in_pieces,
     "piecewise linear": piecewise_linear,
 }
 

@@ -1,6 +1,6 @@
 """The phase of a running movement: how far it is from what the whole clip says, beside peers.
 
-    python benchmarks/live.py DATA_FOLDER [phase] [moments] [confidence] [finish] [intervals]
+    python benchmarks/live.py DATA_FOLDER [phase] [moments] [confidence] [intervals]
 
 Every actor is held out in turn: aSpace, synchronizer and mean are learnt of the others, P = 100.
 The reference is the phase of a whole clip, ``DenseSynchronizer(n_frames=100).match(clip)``, read
@@ -429,42 +429,6 @@ def auc(right, wrong, when):
     return roc_auc_score(np.repeat([1, 0], [len(right), len(wrong)]), scores)
 
 
-# -- time to finish ---------------------------------------------------------------------
-
-
-def time_left(known, elapsed, phase, rate):
-    """Frames until the end, by every way to tell: {name: frames}, of frames elapsed."""
-    share, less = phase / (P - 1), np.maximum(known.duration - 1 - elapsed, 0)
-    usual = (P - 1 - phase) * known.tick
-    return {
-        "mean duration less elapsed": less,
-        "phase left, at the mean pace": usual,
-        "phase left, at the rate": usual / np.maximum(rate, 0.2),
-        "the first two, the second by the share of phase: `time_left`": (1 - share) * less
-        + share * usual,
-    }
-
-
-def finish_table(folder):
-    """Mean absolute errors, in % of the clip, at 25, 50 and 75 % of it."""
-    for archive, name in ARCHIVES.items():
-        folds, found = folds_of(folder, archive), {}
-        for action, some in folds.items():
-            for fold in some:
-                for clip, live in zip(fold.clips, fold.live, strict=True):
-                    last = len(clip) - 1
-                    at = np.round(np.array([0.25, 0.5, 0.75]) * last).astype(int)
-                    left = time_left(fold.known, at, live.phase[at], live.rate[at])
-                    for kind, frames in left.items():
-                        errors = 100 * np.abs(frames - (last - at)) / last
-                        found.setdefault(kind, {}).setdefault(action, []).append(errors)
-        print_head(f"time to finish, {name}", [*folds, "mean"])
-        for kind, by_action in found.items():
-            rows = [np.mean(errors, axis=0) for errors in by_action.values()]
-            cells = [" ".join(f"{x:.1f}" for x in row) for row in (*rows, np.mean(rows, axis=0))]
-            print_row(kind, cells)
-
-
 # -- intervals --------------------------------------------------------------------------
 
 
@@ -545,7 +509,6 @@ TABLES = {
     "phase": phase_table,
     "moments": moment_table,
     "confidence": confidence_table,
-    "finish": finish_table,
     "intervals": interval_table,
 }
 
