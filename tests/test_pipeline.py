@@ -57,22 +57,6 @@ def test_pipeline_scores_predicts_and_samples(people):
     assert pipe[-1].sample(5, random_state=0).shape == (5, 60, 8)
 
 
-def test_cross_val_score(people):
-    scores = cross_val_score(make_pipe(people.skeleton), people.data, cv=2, error_score="raise")
-    assert np.isfinite(scores).all()
-
-
-def test_group_k_fold_by_actor(people):
-    scores = cross_val_score(
-        make_pipe(people.skeleton),
-        people.data,
-        groups=people.actor,
-        cv=GroupKFold(4),
-        error_score="raise",
-    )
-    assert np.isfinite(scores).all()
-
-
 def test_grid_search(people):
     search = GridSearchCV(make_pipe(people.skeleton), PARAMETERS, cv=2, error_score="raise")
     search.fit(people.data)
@@ -107,12 +91,6 @@ def test_model_scores_another_action_lower(bends, real_data):
 @pytest.fixture(scope="module")
 def few():
     return make_bending(5, n_frames=40, random_state=2)
-
-
-@pytest.fixture
-def no_figures():
-    yield
-    mpl.pyplot.close("all")
 
 
 def nestings(skeleton, synchronizer):
@@ -154,7 +132,7 @@ def said_of(pipe, X):
 
 
 @pytest.mark.parametrize("name", NESTINGS)
-def test_synchronizer_is_found_in_nested_pipelines(name, few, flat, no_figures):
+def test_synchronizer_is_found_in_nested_pipelines(name, few, flat):
     pipe = flat[0]
     if name != "flat":
         pipe = nestings(few.skeleton, DenseSynchronizer(40))[name].fit(few.data)
@@ -205,7 +183,7 @@ OF_PIPELINES = {
 
 @pytest.mark.parametrize("nested", [False, True])
 @pytest.mark.parametrize("routing", [False, True])
-def test_displays_and_scorers_take_key_frames(nested, routing, few, no_figures):
+def test_displays_and_scorers_take_key_frames(nested, routing, few):
     pipe, K = make_marked(few, nested=nested), list(few.keyframes)
     points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
     sync = LinearSynchronizer(40).fit(points, keyframes=K)
@@ -254,7 +232,7 @@ def test_model_without_a_synchronizer_refuses_key_frames(few):
         ActionModelDisplay.from_estimator(make_marked(few, nested=False), keyframes=few.keyframes)
 
 
-def test_key_frames_reach_a_step_before_the_synchronizer(few, no_figures):
+def test_key_frames_reach_a_step_before_the_synchronizer(few):
     """Dense matching of what coincides in its key-frames already."""
     K = few.keyframes
     points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
@@ -276,7 +254,6 @@ def run_example(monkeypatch, capsys, *arguments):
     mpl.use("Agg")
     monkeypatch.setattr(sys, "argv", [str(EXAMPLE), *map(str, arguments)])
     runpy.run_path(str(EXAMPLE), run_name="__main__")
-    mpl.pyplot.close("all")
     return capsys.readouterr().out
 
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import ActionModel, find_departures, to_frame
+from sklearn_motionsync.model.similarity import PerformanceStream
 from test_similarity import (
     curves,
-    kept_of,
     slow_dissimilarity,
     slow_threshold,
     slow_weights,
@@ -119,6 +119,12 @@ def test_a_label_is_the_same_group_in_all_calls():
 
 
 # -- performances kept -------------------------------------------------------------------
+
+
+def kept_of(groups):
+    """Indices of the performances of these groups that a stream keeps."""
+    X = np.zeros((len(groups), 2, 1))
+    return np.flatnonzero(PerformanceStream.starting_at(X[0]).extend(X, groups)[2])
 
 
 def slow_choice(groups, most=64):

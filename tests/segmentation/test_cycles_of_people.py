@@ -67,28 +67,3 @@ def test_matched_phases_of_foot_strikes_vary_less_than_at_constant_periods(cycle
     within = [cycles.deviations(phases, strikes)[0] for phases in (followed, constant)]
     assert within[0] < 2
     assert within[0] < 0.6 * within[1]
-
-
-def test_warnings_of_several_cycles_are_right(cycles, real_data):
-    """Chains in which every second or fourth repetition is done wrong have several."""
-    found = dict(cycles.warnings_of(real_data))
-    for name, (_, n_false, _, _) in found.items():
-        assert n_false == 0 or "limbs" in name or "1 of" in name
-    n_right, _, n_wrong, _ = np.sum(list(found.values()), axis=0)
-    assert n_right > 550
-    assert n_wrong < 0.07 * n_right
-    chains = np.sum([counts for name, counts in found.items() if "1 of" in name], axis=0)
-    assert chains[1] + chains[3] > 100
-    assert chains[3] > 0.7 * chains[2]
-
-
-def test_repetitions_are_not_cut_together(cycles, real_data):
-    """Exercises with shallow repetitions; walks, jogs and whole exercises."""
-    found = list(cycles.warnings_of_lengths(real_data, seeds=2, sizes=(0.4,)))
-    n_right, n_false, n_wrong, n_warned = np.sum([counts for _, (_, counts) in found], axis=0)
-    assert n_right > 190
-    assert n_false <= 0.01 * n_right
-    assert n_wrong < 0.04 * n_right
-    assert n_warned >= n_wrong - 1
-    shallow = [shares for name, (shares, _) in found if "size" in name]
-    assert min(map(len, shallow)) > 1000

@@ -534,16 +534,6 @@ def test_threshold_of_a_take_rejects_a_crowd_and_lies_in_gaps():
     assert alone.threshold_of_take(0.5, np.linspace(0.1, 0.5, 99), 900) == 0.5
 
 
-def test_action_that_is_repeated_without_end_is_found_throughout(pipe):
-    """However many hits there are, the threshold is that of one."""
-    rng, parts = np.random.default_rng(1), []
-    for _ in range(80):
-        parts.append(movement(rng.integers(52, 72), rng.uniform(0.9, 1.1), rng.uniform(0.95, 1.05)))
-    take = np.concatenate(parts)
-    _, locations = find_performances(pipe, take + 0.02 * rng.standard_normal(take.shape))
-    assert len(locations) >= 76
-
-
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 def test_threshold_of_a_take_is_that_of_the_take():
     rng = np.random.default_rng(0)

@@ -9,7 +9,6 @@ import pytest
 from sklearn.exceptions import NotFittedError
 from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
-from sklearn.utils.estimator_checks import check_estimator
 from sklearn_motionsync import (
     ActionModel,
     ASpace,
@@ -40,10 +39,6 @@ def test_short_subclass_finds_shifts(shifted):
     np.testing.assert_array_equal(offsets.round(), [0, -8, 4, 8, -2])
     out = sync.transform(shifted)
     np.testing.assert_allclose(out[:, 20:60], np.repeat(out[:1, 20:60], 5, axis=0), atol=0.15)
-
-
-def test_check_estimator():
-    check_estimator(ShiftSynchronizer())
 
 
 def test_subclass_works_with_scorers_and_searches(shifted):

@@ -69,15 +69,6 @@ def test_linear_median_is_the_smallest_sum_of_distances(warps):
 
 
 @pytest.mark.parametrize("estimator", BOTH)
-def test_pattern_is_matched_to_itself(estimator, warps):
-    sync = estimator(n_frames=40).fit(warps)
-    offsets, times, distances = sync.match([warps[sync.pattern_index_]])
-    assert not offsets.any()
-    np.testing.assert_array_equal(times[0], np.arange(40))
-    assert distances[0] < 1e-9
-
-
-@pytest.mark.parametrize("estimator", BOTH)
 def test_pattern_by_index_or_array(estimator, warps):
     by_index = estimator(n_frames=40, pattern=2).fit(warps)
     assert by_index.pattern_index_ == 2
@@ -151,19 +142,6 @@ def test_keyframe_errors_of_bending_are_a_fifth_of_linear(bending, bending_aspac
     )
     assert linear > 4
     assert 5 * dense < linear
-
-
-def test_new_performances_are_warped_to_the_learnt_clock(bending, bending_aspace):
-    sync = DenseSynchronizer(100).fit(bending_aspace[:30])
-    together = sync.match(bending_aspace[30:])
-    one = sync.match(bending_aspace[33:34])
-    np.testing.assert_array_equal(one.offsets[0], together.offsets[3])
-    times = np.interp(
-        bending.keyframes[33] * 99 / (len(bending.data[33]) - 1), one.times[0], np.arange(100)
-    )
-    pattern = bending.keyframes[sync.pattern_index_]
-    pattern = pattern * 99 / (len(bending.data[sync.pattern_index_]) - 1)
-    assert np.abs(times - pattern).mean() < 2
 
 
 @pytest.mark.parametrize("metric", ["learned", None])
@@ -242,25 +220,6 @@ def test_more_smoothness_is_smoother(warps):
 
 
 # -- bad input --------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("estimator", BOTH)
-@pytest.mark.parametrize(
-    ("pattern", "message"),
-    [
-        (4, "pattern=4 is out of range: there are 4 performances, the last has index 3"),
-        (np.zeros((10, 2)), r"must have shape \(n_frames, 3\).*got \(10, 2\)"),
-        (np.zeros((1, 3)), "at least 2"),
-        (np.full((10, 3), np.nan), "NaN"),
-        ([["a", "b", "c"]] * 3, "The pattern is not a numeric array: got str, 'a'"),
-        ("mean", "'pattern' parameter"),
-        (-1, "'pattern' parameter"),
-        (1.5, "'pattern' parameter"),
-    ],
-)
-def test_fit_refuses_invalid_patterns(estimator, pattern, message, warps):
-    with pytest.raises(ValueError, match=message):
-        estimator(pattern=pattern).fit(warps)
 
 
 @pytest.mark.parametrize(

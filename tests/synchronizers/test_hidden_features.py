@@ -370,7 +370,6 @@ def test_wrong_confidence_is_refused(case):
 
 
 def test_displays_of_performances_with_gaps():
-    pyplot = pytest.importorskip("matplotlib.pyplot")
     sync = clone(DENSE).fit(GAPPY)
     shown = SynchronizationDisplay.from_estimator(sync, GAPPY, features=[3, 4])
     assert shown.pattern_index == sync.pattern_index_
@@ -382,7 +381,6 @@ def test_displays_of_performances_with_gaps():
     assert np.isfinite(shown.pattern_[0].get_ydata()).all()
     TrellisDisplay.from_estimator(sync, GAPPY, performance=1)
     MetricDisplay.from_estimator(sync)
-    pyplot.close("all")
 
 
 def test_lags_and_tables_of_performances_with_gaps():

@@ -30,11 +30,12 @@ def error(X, truth, **params):
 # -- copies of one source -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("noise", [0.005, 0.05, 0.2])
-@pytest.mark.parametrize("n_features", [1, 2, 4, 16])
+@pytest.mark.parametrize(
+    ("noise", "n_features"), [(0.005, 1), (0.05, 4), (0.2, 2), (0.005, 16), (0.2, 16)]
+)
 def test_copies_of_one_source_are_refined(n_features, noise, known_warps):
     """At any noise, and refining them is right."""
-    for seed in range(3):
+    for seed in range(2):
         X, truth = known_warps(seed, noise, n_features)
         sync = DenseSynchronizer(P, pattern=0).fit(X)
         assert sync.refines_
@@ -152,7 +153,7 @@ def test_forces_of_people_are_not_refined(file, real_data):
     assert_not_refined(list(curves[:, :, np.newaxis]))
 
 
-@pytest.mark.parametrize("action", ["depositFloorR", "sneak2StepsLStart", "grabHighR"])
+@pytest.mark.parametrize("action", ["depositFloorR", "grabHighR"])
 def test_people_are_not_refined(action, real_data):
     """All actors and each by himself, all features and the first few: refining misleads there.
 
@@ -163,7 +164,7 @@ def test_people_are_not_refined(action, real_data):
     postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
     for actor in (None, "bd", "bk", "dg", "tr"):
         mine = [x for x, i in zip(postures, chosen, strict=True) if actor in (None, bunch.actor[i])]
-        counts = (None, 3, 2, 1) if actor is None else (None, 3, 2)
+        counts = (None, 2, 1) if actor is None else (None, 2)
         assert_not_refined_whatever_the_features(mine, counts)
 
 

@@ -8,7 +8,7 @@ import pytest
 from sklearn.decomposition import PCA
 from sklearn.model_selection import GridSearchCV, GroupKFold
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer, to_frame
+from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.matching.gaps import SHRINKAGE, Filler
 
 
@@ -268,24 +268,6 @@ def test_constant_features_and_few_postures(n):
 
 
 # -- input and output ---------------------------------------------------------------------
-
-
-def test_every_kind_of_collection_with_gaps_gives_equal_results():
-    X = hide(low_rank(4), 0.2, run=5)
-    fitted = ASpace(2).fit(X)
-    expected = np.stack(fitted.transform(X))
-    objects = np.empty(4, dtype=object)
-    objects[:] = X
-    for given in (np.stack(X), tuple(X), objects, [x.tolist() for x in X]):
-        again = ASpace(2).fit(given)
-        np.testing.assert_array_equal(np.stack(list(again.transform(given))), expected)
-    table = to_frame(X, columns=list("abcdef"))
-    pandas = ASpace(2).set_output(transform="pandas").fit_transform(table)
-    np.testing.assert_array_equal(pandas.to_numpy(), np.concatenate(expected))
-    single = ASpace(2).fit([x.astype("f4") for x in X])
-    points = single.transform([x.astype("f4") for x in X])
-    assert points[0].dtype == single.components_.dtype == single.mean_.dtype == "f4"
-    np.testing.assert_allclose(np.stack(points), expected, rtol=2e-3, atol=2e-3)
 
 
 def test_the_input_is_not_written_to():

@@ -84,8 +84,15 @@ def test_callbacks_follow_every_fit_and_change_no_bit(estimator):
     assert found == bits(clone(estimator).fit(X), X)
 
 
-@pytest.mark.parametrize("where", ["setup", "first task", "middle", "last task"])
-@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+@pytest.mark.parametrize(
+    ("estimator", "where"),
+    [
+        *((estimator, "last task") for estimator in EVERY),
+        *((LinearSynchronizer(), where) for where in ("setup", "first task", "middle")),
+        *((DenseSynchronizer(), where) for where in ("setup", "first task", "middle")),
+    ],
+    ids=by_name,
+)
 def test_a_callback_that_raises_stops_the_fit(estimator, where):
     """The earlier fit is as it was."""
     X, all_of_it = data_for(estimator), Recorder()

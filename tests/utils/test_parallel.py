@@ -42,10 +42,10 @@ def bits(X, **settings):
     return [np.asarray(result).tobytes() for result in [*results, *sync.match(X)]]
 
 
-@pytest.fixture(scope="module", params=SETTINGS)
-def reference(request, walks):
-    settings = SETTINGS[request.param]
-    return settings, bits(walks, **settings)
+@pytest.fixture(scope="module")
+def references(walks):
+    """The bits of one job, by the name of the settings."""
+    return {name: bits(walks, **settings) for name, settings in SETTINGS.items()}
 
 
 CONTEXTS = {
@@ -60,12 +60,18 @@ CONTEXTS = {
 
 
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
-@pytest.mark.parametrize("name", CONTEXTS)
-def test_results_are_equal_to_the_last_bit_in_any_context(walks, reference, name):
-    settings, expected = reference
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        *(("defaults", name) for name in CONTEXTS),
+        *(("paper", name) for name in ("3 threads", "no memory")),
+        *(("refined", name) for name in ("3 threads", "no memory")),
+    ],
+)
+def test_results_are_equal_to_the_last_bit_in_any_context(walks, references, settings, name):
     n_jobs, context = CONTEXTS[name]
     with context():
-        assert bits(walks, n_jobs=n_jobs, **settings) == expected
+        assert bits(walks, n_jobs=n_jobs, **SETTINGS[settings]) == references[settings]
 
 
 def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):

@@ -1,6 +1,5 @@
 """Pipelines that begin with a union of views: parameters routed past it, and figures."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from sklearn import clone, config_context
@@ -24,12 +23,6 @@ BUNCH = make_bending(7, n_frames=40, random_state=2)
 K = list(BUNCH.keyframes)
 COSINES = DirectionCosines(BUNCH.skeleton)
 POSITIONS = JointPositions(BUNCH.skeleton)
-
-
-@pytest.fixture(autouse=True)
-def no_figures():
-    yield
-    plt.close("all")
 
 
 def union_of(*views):
