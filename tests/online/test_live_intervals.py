@@ -157,13 +157,6 @@ def test_intervals_widen_while_nothing_is_seen(fitted, clips):
     assert width(blind)[len(x) // 2] > 1.3 * width(blind)[len(x) // 8] > 4
 
 
-def test_intervals_of_another_movement_are_wide(fitted, clips):
-    x = clips[0]
-    right, other = fitted.track([x, np.roll(x, 7, axis=1)])
-    check_bounds(other)
-    assert width(other)[len(x) // 4 :].mean() > 5 * width(right)[len(x) // 4 :].mean()
-
-
 def test_intervals_begin_narrow_at_the_first_frame(fitted, live, clips):
     for found in fitted.track(clips):
         assert found.lower[0] == 0

@@ -23,7 +23,7 @@ SYNCHRONIZERS = [
 ]
 every_synchronizer = pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=str)
 # The same examples everywhere.
-few = settings(max_examples=8, deadline=None, derandomize=True, database=None)
+few = settings(max_examples=6, deadline=None, derandomize=True, database=None)
 ROUNDING = 1e-6
 
 
@@ -72,7 +72,7 @@ def test_warps_do_not_depend_on_the_unit(estimator, X, exponent, binary):
     assert_close(times(estimator, [10.0**exponent * x for x in X]), expected)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_the_last_bits_of_a_metric_do_not_show_in_sharpened_warps(seed):
     rng = np.random.default_rng(seed)
     X = [np.cumsum(rng.standard_normal((n, 2)), axis=0) for n in (15, 22, 28, 33, 39)]
@@ -136,22 +136,3 @@ def test_warps_do_not_depend_on_the_frame_rate(estimator, X, factor):
         return np.column_stack([np.interp(fine, np.arange(len(x)), column) for column in x.T])
 
     assert_close(times(estimator, [resampled(x) for x in X]), times(estimator, X))
-
-
-@every_synchronizer
-@few
-@given(performances(), st.integers(0, 2))
-def test_pattern_is_matched_to_itself(estimator, X, pattern):
-    frames = np.arange(30)
-    assert_close(times(estimator, X, pattern=pattern)[pattern], frames, 0)
-    given_as_array = clone(estimator).set_params(n_frames=30, pattern=X[pattern]).fit(X)
-    assert_close(given_as_array.match([X[pattern]]).times[0], frames, 0)
-
-
-@every_synchronizer
-@few
-@given(performances())
-def test_warps_do_not_depend_on_the_other_performances(estimator, X):
-    sync = clone(estimator).set_params(n_frames=30).fit(X)
-    alone = np.concatenate([sync.match([x]).times for x in X])
-    assert_close(sync.match(X).times, alone, 0)
