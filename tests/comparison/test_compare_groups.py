@@ -361,8 +361,6 @@ GROUPS = ["a", "b"] * 8
     [
         ({}, "Give either groups or a covariate"),
         ({"groups": GROUPS, "covariate": range(16)}, "Give either groups or a covariate"),
-        ({"groups": ["a"] * 16}, "groups: all labels are equal"),
-        ({"groups": GROUPS[:5]}, "groups must have one label"),
         (
             {"groups": ["a"] * 15 + ["b"]},
             "At least two people a group are needed, got 15 in 'a', 1",

@@ -129,11 +129,6 @@ def test_model_of_identical_performances(value):
     assert model.predict([np.full((5, 2), value + 1 + value)]).tolist() == [-1]
 
 
-def test_fit_refuses_one_performance():
-    with pytest.raises(ValueError, match="at least 2 performances"):
-        ActionModel().fit([np.ones((5, 2))])
-
-
 def test_fit_refuses_unsynchronised_performances():
     with pytest.raises(ValueError, match="Performance 1 has 6 frames, performance 0 has 5"):
         ActionModel().fit([np.ones((5, 2)), np.ones((6, 2))])

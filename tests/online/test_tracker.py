@@ -401,11 +401,6 @@ def test_fit_refuses_noise_beyond_all_data(tracker):
         clone(tracker).set_params(noise=1e200).fit(TRAINING)
 
 
-def test_fit_refuses_a_single_performance(tracker):
-    with pytest.raises(ValueError, match="at least 2 performances, got n_samples = 1"):
-        clone(tracker).fit([movement(1)])
-
-
 # -- people -------------------------------------------------------------------------------
 
 

@@ -88,12 +88,6 @@ def test_no_metric_equals_metric_none(settings, n, trials):
     np.testing.assert_array_equal(sync.match(X).distances, plain.match(X).distances)
 
 
-def test_constant_performances_give_no_metric():
-    sync = DenseSynchronizer(20).fit(np.ones((4, 20, 2)))
-    assert sync.metric_ is None
-    np.testing.assert_array_equal(sync.match(np.ones((2, 20, 2))).offsets, 0)
-
-
 def test_one_feature_gives_a_metric(trials):
     X = [x[:, :1] for x in trials[0]]
     sync = DenseSynchronizer(60, pattern=0).fit(X)
