@@ -19,7 +19,7 @@ from .acclaim import read_acclaim
 from .bvh import read_bvh
 from .c3d import MissingGroup, read_c3d
 from .gaps import check_ends, check_max_gap, fill_gaps, warn_of_gaps, warn_of_missing
-from .storage import read_storage
+from .text import read_storage
 from .timestamps import check_frame_rate, describe_times, warn_of_other_rate
 from .trc import read_trc
 

@@ -25,9 +25,15 @@ from ..utils.groups import encode_groups, group_counts
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .personal import PersonalReference
-from .sampling import sample_performances, sample_postures
 from .similarity import LEAST, Neighbours, PerformanceStream, learn_weights, log_moments
-from .variation import clock_error, mean_band, predictive_variance, simultaneous_factor
+from .variation import (
+    clock_error,
+    mean_band,
+    predictive_variance,
+    sample_performances,
+    sample_postures,
+    simultaneous_factor,
+)
 
 __all__ = ["ActionModel"]
 
@@ -169,7 +175,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             group, or there is not a group for each; if nothing of a performance was seen, or a
             value was seen in fewer than two groups.
         """
-        performances = self._check_seen(_check_lengths(self._check_training_set(X)))
+        performances = _check_synchronised(self._check_training_set(X))
         if len(performances) < 2:
             raise ValueError(
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
@@ -245,7 +251,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         if hasattr(self, "_stream"):
             performances, stream = self._check_clock(X), self._stream
         else:
-            performances = self._check_seen(_check_lengths(self._check_training_set(X)))
+            performances = _check_synchronised(self._check_training_set(X))
             stream = PerformanceStream.starting_at(performances[0])
         self.__dict__.update(self._learn(stream, performances, groups))
         return self
@@ -575,8 +581,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             The half-width of the simultaneous band.
         """
         self._check_groups_seen()
-        training = self._stream.kept.astype(np.float64)
-        return simultaneous_factor(training, self.groups_, self.coverage)
+        return simultaneous_factor(
+            self._stream.kept.astype(np.float64), self.groups_, self.coverage
+        )
 
     def sample(
         self, n: int = 1, frame: int | None = None, random_state: RandomState = None
@@ -616,8 +623,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         mean, variance, deviations = self.mean_, self.variance_, self.deviations_
         if frame is not None:
             k = self._check_frame(frame)
-            mean, variance, deviations = mean[k], variance[k], deviations[:, k]
-            return sample_postures(mean, variance, deviations, n, self.n_std, random_state)
+            return sample_postures(
+                mean[k], variance[k], deviations[:, k], n, self.n_std, random_state
+            )
         dissimilarity, limit = self._neighbours.dissimilarity, self.threshold_
         samples = sample_performances(
             mean, variance, deviations, n, dissimilarity, limit, random_state
@@ -636,8 +644,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         """The attributes that are known after more performances than those of a stream."""
         stream, codes, is_kept = before.extend(performances, groups)
         dtype, unseen = stream.kept.dtype, self._describe_unseen(stream)
-        spread = (stream.variance.mean(axis=0) + stream.mean.var(axis=0)).max()
-        spread = float(spread.astype(dtype))
+        spread = float((stream.variance.mean(axis=0) + stream.mean.var(axis=0)).max().astype(dtype))
         learnt = {
             "n_samples_seen_": stream.n,
             "n_frames_": len(stream.origin),
@@ -663,14 +670,13 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         dissimilarities = neighbours.dissimilarity(performances, codes)
         compared = np.concatenate([compared_before, dissimilarities])
         moments = stream.dropped + log_moments(compared)
-        dropped = stream.dropped + log_moments(compared[~is_kept])
         return learnt | {
             "dissimilarities_": dissimilarities,
             "threshold_": neighbours.limit(moments, self.coverage),
             "_neighbours": neighbours,
             "_kept_dissimilarities": compared[is_kept],
             "_log_moments": moments,
-            "_stream": replace(stream, dropped=dropped),
+            "_stream": replace(stream, dropped=stream.dropped + log_moments(compared[~is_kept])),
         }
 
     def _judge(self, reference):
@@ -698,16 +704,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             f"{counted(int((n_groups < 2).sum()), 'value')} of {n_groups.size} are so"
         )
 
-    def _check_seen(self, performances):
-        """Refuse performances that show nothing."""
-        for i, x in enumerate(performances):
-            if is_gappy(x) and np.isnan(x).all():
-                raise ValueError(
-                    f"{performances.called(i)} is NaN in every frame and feature: nothing of it "
-                    "was seen. Drop the performance."
-                )
-        return performances
-
     def _check_frame(self, frame):
         if not isinstance(frame, Integral) or not 0 <= frame < self.n_frames_:
             raise ValueError(
@@ -716,7 +712,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         return int(frame)
 
     def _check_clock(self, X):
-        performances = self._check_seen(_check_lengths(super().check_performances(X)))
+        performances = _check_synchronised(super().check_performances(X))
         if len(performances[0]) != self.n_frames_:
             raise ValueError(
                 f"The performances have {len(performances[0])} frames, the model "
@@ -737,12 +733,17 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             )
 
 
-def _check_lengths(performances):
-    n_frames = len(performances[0])
+def _check_synchronised(performances):
+    """Refuse performances of several lengths, and those that show nothing."""
     for i, x in enumerate(performances):
-        if len(x) != n_frames:
+        if len(x) != len(performances[0]):
             raise ValueError(
-                f"Performance {i} has {len(x)} frames, performance 0 has {n_frames}: a model "
-                "needs synchronised performances. Put a DenseSynchronizer before it."
+                f"Performance {i} has {len(x)} frames, performance 0 has {len(performances[0])}: a "
+                "model needs synchronised performances. Put a DenseSynchronizer before it."
+            )
+        if is_gappy(x) and np.isnan(x).all():
+            raise ValueError(
+                f"{performances.called(i)} is NaN in every frame and feature: nothing of it was "
+                "seen. Drop the performance."
             )
     return performances

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from numbers import Integral, Real
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator, clone
@@ -14,7 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..body.joint_noise import JointNoise
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS, check_facts, facts_of
-from ..inputs.numbers import LARGEST, as_numbers
+from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude
 from ..inputs.recorded import warn_of_rows
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.types import Indexed, Labels, NumbersLike, PerformancesLike, RandomState, ValuesLike
@@ -26,11 +26,14 @@ from ..utils.groups import encode_groups
 from ..utils.parallel import LongWorkMixin, one_blas_thread
 from ..utils.parameters import validated
 from .members import RunningTake, Track, filter_take, smooth_take, stack_frames
-from .observations import Observer, check_projection
 from .state_space import Clock, TrackerModel
 from .stream import check_observations, check_times, times_of_each
 
-__all__ = ["MotionTracker"]
+__all__ = [
+    "MotionTracker",
+    "Observer",
+    "check_projection",
+]
 
 
 class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
@@ -409,3 +412,60 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
                 frames = method(self._model, self._seed, values - offset, t, observer)
             tracks.append(stack_frames(frames, self.mean_.dtype))
         return tracks[0] if single else tracks
+
+
+# -- the frames of a recording, of which something may be hidden -----------------------------------
+
+
+class Observer(NamedTuple):
+    """``y = matrix @ posture + noise``.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (n_observed, n_features)
+    noise : ndarray, shape (n_observed, n_observed)
+        Covariance of the noise.
+    """
+
+    matrix: np.ndarray
+    noise: np.ndarray
+
+    def of(self, chosen):
+        """Of the observed numbers with this mask alone."""
+        return Observer(self.matrix[chosen], self.noise[np.ix_(chosen, chosen)])
+
+
+def check_projection(projection, n_features):
+    """The observation matrix (n_observed, n_features) and its offset (n_observed,), checked.
+
+    Parameters
+    ----------
+    projection : array-like, pair of two of them, or None
+        A matrix; or it and the offset; None is the identity.
+    n_features : int
+
+    Returns
+    -------
+    matrix, offset : ndarray
+
+    Raises
+    ------
+    ValueError
+        If the matrix is not of this width, or anything is not finite or above 1e9, or there is not
+        one offset for each of its rows.
+    """
+    if projection is None:
+        return np.eye(n_features), np.zeros(n_features)
+    pair = projection if isinstance(projection, tuple) else (projection,)
+    pair = [as_numbers(part, "The projection", dtype=np.float64) for part in pair]
+    shapes, n = [part.shape for part in pair], len(np.atleast_1d(pair[0]))
+    if n == 0 or shapes not in ([(n, n_features)], [(n, n_features), (n,)]):
+        raise ValueError(
+            f"projection must be a matrix (n_observed, {n_features}), or the pair (matrix, offset) "
+            f"with an offset (n_observed,); got the shapes {shapes}."
+        )
+    matrix, offset = pair if len(pair) == 2 else (pair[0], np.zeros(n))
+    both = np.column_stack([matrix, offset])
+    check_finite(both, "The projection, row")
+    check_magnitude(float(np.abs(both).max()), "The projection", training=False)
+    return matrix, offset

@@ -27,9 +27,8 @@ from ..utils.groups import add_unknown_label, encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
 from ..utils.parameters import validated
 from .distances import SETTINGS
-from .kernel import MotionKernel
+from .kernel import MotionKernel, assign_folds, decision_values, fit_regression
 from .pairwise import PairwiseDistance
-from .regression import assign_folds, decision_values, fit_regression
 
 __all__ = ["ActionClassifier"]
 

@@ -29,20 +29,22 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .cutting import as_takes, cut_takes
-from .phases import (
+from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
+from .stretches import (
     FOLLOWS,
     PHASES,
     SampledStretch,
+    Stretch,
     average_cycle,
     circular_peak,
     constant_phases,
+    find_repeats,
     locate_cycles,
     match_phases,
     move_to_events,
     similarity,
+    summary_of,
 )
-from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
-from .stretches import Stretch, find_repeats, summary_of
 
 __all__ = [
     "CycleSegmenter",

@@ -11,7 +11,7 @@ from sklearn_motionsync import (
     DirectionCosines,
     Skeleton,
 )
-from sklearn_motionsync.model.sampling import (
+from sklearn_motionsync.model.variation import (
     TangentSpace,
     directions_in,
     sample_performances,

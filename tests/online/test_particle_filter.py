@@ -10,7 +10,6 @@ from scipy.stats import multivariate_normal
 from sklearn_motionsync import LinearSynchronizer, MotionTracker
 from sklearn_motionsync.online import members
 from sklearn_motionsync.online.members import RunningTake, pool
-from sklearn_motionsync.online.observations import Observer
 from sklearn_motionsync.online.particle_filter import (
     ParticleFilter,
     Particles,
@@ -24,6 +23,7 @@ from sklearn_motionsync.online.state_space import (
     RateProcess,
     TrackerModel,
 )
+from sklearn_motionsync.online.tracker import Observer
 
 
 def noise_of(deviation, n=3):

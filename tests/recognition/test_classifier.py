@@ -32,12 +32,12 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.display import SkeletonDisplay
 from sklearn_motionsync.recognition.classifier import choose_landmarks
-from sklearn_motionsync.recognition.pairwise import PairwiseDistance
-from sklearn_motionsync.recognition.regression import (
+from sklearn_motionsync.recognition.kernel import (
     KernelRegression,
     assign_folds,
     decision_values,
 )
+from sklearn_motionsync.recognition.pairwise import PairwiseDistance
 
 KINDS = ("wave", "rise", "turn")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import logsumexp, softmax
-from sklearn_motionsync.recognition.regression import (
+from sklearn_motionsync.recognition.kernel import (
     KernelRegression,
     assign_folds,
     decision_values,

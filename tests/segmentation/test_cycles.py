@@ -23,7 +23,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import CycleDisplay
-from sklearn_motionsync.segmentation.phases import SampledStretch, locate_cycles
+from sklearn_motionsync.segmentation.stretches import SampledStretch, locate_cycles
 
 HIP = 0
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import CycleSegmenter, gait_events
 from sklearn_motionsync.datasets import load_performances, make_walk
-from sklearn_motionsync.segmentation.phases import move_to_events
+from sklearn_motionsync.segmentation.stretches import move_to_events
 
 WALK = make_walk(4, n_strides=6, random_state=0)
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from sklearn_motionsync import CycleSegmenter
-from sklearn_motionsync.segmentation.phases import (
+from sklearn_motionsync.segmentation.stretches import (
     PHASES,
     average_cycle,
     circular_peak,
