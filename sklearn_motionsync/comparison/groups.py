@@ -51,7 +51,7 @@ class GroupComparison:
         As given.
     design : str
         What was compared, in words.
-    unit : str
+    unit : {"frames", "percent", "seconds"}
         Of start, end, peak, and of the sizes of timing.
 
     Examples

@@ -59,7 +59,7 @@ class NormComparison:
         As given.
     n_people : int
         Of the norm.
-    unit : str
+    unit : {"frames", "percent", "seconds"}
         Of time.
     clock : ndarray, shape (P,)
         Times of the frames of the template.
