@@ -21,6 +21,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from harness import print_head, print_row
 from scipy.interpolate import CubicSpline
 from sklearn_motionsync import DenseSynchronizer
 
@@ -146,8 +147,7 @@ def children_table():
     children = read_children()
     moments = np.array([events_of_child(x) for x in children])
     methods = {"linear time normalisation": linear, "`DenseSynchronizer()`": dense()}
-    print("\n| method | knee alone | hip alone | knee and hip together | still | hurry |")
-    print("|---|---|---|---|---|---|")
+    print_head("method", ["knee alone", "hip alone", "knee and hip together", "still", "hurry"])
     for method, times in methods.items():
         cells, rates = [], []
         for joints, at in ((slice(1, 2), slice(3)), (slice(1), slice(3, 4)), (slice(2), slice(4))):
@@ -155,13 +155,13 @@ def children_table():
             cells.append(", ".join(f"{x:.2f}" for x in spreads_of(moments[:, at], found)))
             rates.append(np.diff(found, axis=1))
         cells += [f"{np.mean(np.array(rates) < 0.1):.1%}", f"{np.mean(np.array(rates) > 2):.1%}"]
-        print(f"| {method} | " + " | ".join(cells) + " |", flush=True)
+        print_row(method, cells)
 
 
 def main():
     people = read_forces()
-    print("| method | setting | first peak | valley | second peak | mean | last five people |")
-    print("|---|---|---|---|---|---|---|")
+    columns = ["setting", "first peak", "valley", "second peak", "mean", "last five people"]
+    print_head("method", columns)
     for method, settings in METHODS.items():
         found = {}
         for setting, times in settings.items():
@@ -171,11 +171,9 @@ def main():
                 found[setting] = np.array([spreads(y, times(y)) for y in people])
         best = min(found, key=lambda setting: found[setting][:CHOSEN_ON].mean())
         for setting, of_people in found.items():
-            each = " | ".join(f"{x:.2f}" for x in of_people.mean(axis=0))
-            held = f"{of_people[CHOSEN_ON:].mean():.2f}" if setting == best else ""
-            print(
-                f"| {method} | {setting} | {each} | {of_people.mean():.2f} | {held} |", flush=True
-            )
+            means = [*of_people.mean(axis=0), of_people.mean()]
+            last = f"{of_people[CHOSEN_ON:].mean():.2f}" if setting == best else ""
+            print_row(method, [setting, *(f"{x:.2f}" for x in means), last])
     children_table()
 
 

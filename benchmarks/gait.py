@@ -13,13 +13,13 @@ others is run beside.
 What is refused: people that stand, and most that exercise on the spot, have no events.
 """
 
-import argparse
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from exercises import LANDMARKS
+from harness import command_line, print_head, print_row, run_tables
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn_motionsync import Skeleton, gait_events
@@ -29,6 +29,7 @@ from sklearn_motionsync.io import read_motion
 
 PEOPLE = {"hdm05": ("jogLeftCircle4StepsRstart", 1.0), "cmu07_walk": ("walk", 0.01)}
 LABELS = ("Foot Strike", "Foot Off")
+COUNTS = ("found", "missed", "bias", "error")
 NEAR = 0.15
 # Frame rates, and noise in metres.
 SETTINGS = [(None, 0.0), (60, 0.0), (30, 0.0), (25, 0.0), (None, 0.01), (30, 0.01)]
@@ -110,15 +111,18 @@ def by_extremes(x, rate, skeleton):
     return events
 
 
-def report(name, triples):
-    """Print mean and absolute errors of many recordings."""
+def events_head(corner):
+    print_head(corner, [f"{label}: {what}" for label in LABELS for what in COUNTS])
+
+
+def events_row(name, triples):
+    """Mean and absolute errors of many recordings."""
+    cells = []
     for label in LABELS:
         errors = 1000 * np.concatenate([np.array(e[label]) for e, _, _ in triples])
-        missed = sum(m[label] for _, m, _ in triples)
-        line = (
-            f"bias {errors.mean():6.1f}, error {np.abs(errors).mean():5.1f}" if len(errors) else ""
-        )
-        print(f"  {name:28s} {label:12s} {len(errors):4d} found, {missed:3d} missed, {line}")
+        cells += [str(len(errors)), str(sum(m[label] for _, m, _ in triples))]
+        cells += [f"{x.mean():.1f}" if len(x) else "-" for x in (errors, np.abs(errors))]
+    print_row(name, cells)
 
 
 def name_of(setting):
@@ -126,22 +130,21 @@ def name_of(setting):
     return f"{rate or 'own'} Hz" + (f", {100 * noise:g} cm of noise" if noise else "")
 
 
-def made_walks():
-    print("Made walks, 12 people")
+def made_walks(folder):
+    events_head("made walks, 12 people")
     for rate, noise in SETTINGS:
         walk = make_walk(12, frame_rate=rate or 120, noise=noise or 0.001, random_state=0)
         triples = []
         for x, events in zip(walk.data, walk.events, strict=True):
             true = [(e["label"], e["context"], e["time"]) for e in events]
             triples.append(compare(find(x, walk.frame_rate, walk.skeleton), true))
-        report(name_of((rate, noise)), triples)
+        events_row(name_of((rate, noise)), triples)
 
 
 def people(folder):
     for archive, (label, metres) in PEOPLE.items():
         bunch = load_performances(folder / archive / f"{archive}_positions.npz")
         chosen = np.flatnonzero(bunch.target == label)
-        print(f"{archive}, {len(chosen)} takes")
         against = {"geometry": {}, "whole": {}}
         for k in chosen:
             x, rate = np.asarray(bunch.data[k], dtype=float) * metres, bunch.frame_rate[k]
@@ -153,9 +156,9 @@ def people(folder):
                 against["geometry"].setdefault(setting, []).append(compare(found, geometry))
                 against["whole"].setdefault(setting, []).append(compare(found, whole))
         for what, of_settings in against.items():
-            print(f" against {what}")
+            events_head(f"{archive}, {len(chosen)} takes, against {what}")
             for setting, triples in of_settings.items():
-                report(name_of(setting), triples)
+                events_row(name_of(setting), triples)
 
 
 def marked(df):
@@ -169,7 +172,7 @@ def marked(df):
 
 
 def labelled(files):
-    print(f"{len(files)} labelled files")
+    events_head(f"{len(files)} labelled files")
     marks = ("HEE", "TOE")
     for what, left_out in (("heel and toe", ()), ("ankle and toe", marks[:1]), ("ankle", marks)):
         for setting in SETTINGS if not left_out else SETTINGS[:1]:
@@ -182,14 +185,14 @@ def labelled(files):
                 x = x + np.random.default_rng(0).normal(0, 1000 * setting[1], x.shape)
                 x, rate = thinned(x, rate, setting[0])
                 triples.append(compare(find(x, rate, skeleton), marked(df)))
-            report(f"{what}, {name_of(setting)}", triples)
+            events_row(f"{what}, {name_of(setting)}", triples)
     triples = []
     for path in files:
         df = read_motion(path)
         rate, skeleton = df.attrs["frame_rate"], Skeleton.from_frame(df)
         found = by_extremes(df.to_numpy(dtype=float), rate, skeleton)
         triples.append(compare(found, marked(df)))
-    report("farthest ahead, behind", triples)
+    events_row("farthest ahead, behind", triples)
 
 
 def refused(folder, every=1):
@@ -204,24 +207,21 @@ def refused(folder, every=1):
         sway = 20 * gaussian_filter1d(rng.normal(size=(250, 1, 3)), 25, axis=0)
         still = x[0].reshape(1, -1, 3) + sway + rng.normal(0, 1, (250, x.shape[1] // 3, 3))
         counts["standing"].append(len(find(still.reshape(250, -1), rate, skeleton)))
+    print_head("refused", ["recordings", "with events, %"])
     for name, found in counts.items():
-        share = 100 * np.mean(np.array(found) > 0)
-        print(f"Refused, {name}: events in {share:.1f} % of {len(found)} recordings")
+        print_row(name, [str(len(found)), f"{100 * np.mean(np.array(found) > 0):.1f}"])
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--files", type=Path, nargs="*", default=[])
-    given = parser.parse_args()
-    warnings.simplefilter("ignore")
-    pd.set_option("display.width", 120)
-    made_walks()
-    people(given.folder)
-    refused(given.folder)
-    if given.files:
-        labelled(given.files)
+TABLES = {"made": made_walks, "people": people, "refused": refused}
+
+
+def with_files(options):
+    if options.files:
+        TABLES["files"] = lambda folder: labelled(options.files)
 
 
 if __name__ == "__main__":
-    main()
+    warnings.simplefilter("ignore")
+    command = command_line(__doc__)
+    command.add_argument("--files", type=Path, nargs="*", default=[])
+    run_tables(TABLES, command, with_files)

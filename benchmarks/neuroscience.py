@@ -19,6 +19,7 @@ import argparse
 import importlib.util
 
 import numpy as np
+from harness import print_head, print_row
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import DenseSynchronizer
 
@@ -148,7 +149,7 @@ def main():
     parser.add_argument("--sets", type=int, default=4, help="data sets of each kind")
     n_sets = parser.parse_args().sets
     methods = METHODS | (PEERS if importlib.util.find_spec("affinewarp") else {})
-    print("| held-out R² | " + " | ".join(KINDS) + " |\n|---|" + "---|" * len(KINDS))
+    print_head("held-out R²", KINDS)
     for name, align in {"true warps": None, **methods}.items():
         shares = []
         for kind in KINDS:
@@ -158,7 +159,7 @@ def main():
                 found = positions if align is None else align(counts[:, :, ~judges])
                 shares.append(held_out_r2(counts[:, :, judges], found))
         means = np.reshape(shares, (len(KINDS), n_sets)).mean(axis=1)
-        print(f"| {name} | " + " | ".join(f"{mean:.3f}" for mean in means) + " |", flush=True)
+        print_row(name, [f"{mean:.3f}" for mean in means])
 
 
 if __name__ == "__main__":

@@ -1,31 +1,24 @@
 """How many patients `compare_to_norm` finds, and how many people of the norm it calls different.
 
-    python benchmarks/norm.py [N_NORMS [N_JOBS]]
-    python benchmarks/norm.py people FOLDER
+    python benchmarks/norm.py DATA_FOLDER [made] [people]
 
-Norms of `make_gait`: 18 people with 53 strides, or 10 with 30. Twelve new people of each kind, with
-one stride or three: normal; late, toe-off 3 or 5 % of the cycle later; weak, knee flexion 15 or 20
-degrees less in swing, or a force that is 15 % less. Prints Markdown: per cent of them that differ,
+*Made*: 24 norms of `make_gait`, of 18 people with 53 strides, or 10 with 30. Twelve new people of
+each kind, with one stride or three: normal; late, toe-off 3 or 5 % of the cycle later; weak, knee
+flexion 15 or 20 degrees less in swing, or a force that is 15 % less. Per cent of them that differ,
 at a level of 10 and of 5 %; how many are called shape and timing at 10 %; the largest and the mean
 number of rows of departures, of those that have some.
 
-*People*: exercises of UI-PRMD in FOLDER, such as ../shared/data. The norm are the right repetitions
-of nine people; new is the tenth, by one, five or ten repetitions drawn at random: done right, done
-wrong, and the right ones made 5 and 10 % late. Those of people who use the other side are mirrored.
-Compared are the dimensions of an aSpace of limb directions. Prints per cent that differ at a level
-of 10 %, by exercise.
+*People*: exercises of UI-PRMD. The norm are the right repetitions of nine people; new is the tenth,
+by one, five or ten repetitions drawn at random: done right, done wrong, and the right ones made 5
+and 10 % late. Those of people who use the other side are mirrored. Compared are the dimensions of
+an aSpace of limb directions. Per cent that differ at a level of 10 %, by exercise. Prints Markdown.
 """
-
-import os
-import sys
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
 
 import warnings
 
 import numpy as np
 from exercises import read_exercises
+from harness import command_line, print_head, print_row, run_tables
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -37,7 +30,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_gait
 
-P, NEW = 101, 12
+P, NEW, NORMS = 101, 12, 24
 KINDS = {
     "normal": {},
     "late, 3 %": {"timing": 3},
@@ -87,7 +80,6 @@ def made_late(x, largest):
 
 
 def people(folder):
-    warnings.simplefilter("ignore")
     kinds = ("right", "5 % late", "10 % late", "wrong")
     counts, rng = (1, 5, 10), np.random.default_rng(0)
     rows = {}
@@ -110,29 +102,23 @@ def people(folder):
         rows[name] *= 100 / len(np.unique(actors))
     rows["all"] = np.mean(list(rows.values()), axis=0)
     for k, count in enumerate(counts):
-        print(f"\n| {count} repetition(s) | " + " | ".join(kinds) + " |")
-        print("|---" * (1 + len(kinds)) + "|")
+        print_head(f"{count} repetition(s)", kinds)
         for name, shares in rows.items():
-            print(f"| {name} | " + " | ".join(f"{x:.0f}" for x in shares[k]) + " |", flush=True)
+            print_row(name, [f"{x:.0f}" for x in shares[k]])
 
 
-def main():
-    if sys.argv[1:2] == ["people"]:
-        people(sys.argv[2])
-        return
-    n_norms = int(sys.argv[1]) if len(sys.argv) > 1 else 40
-    n_jobs = int(sys.argv[2]) if len(sys.argv) > 2 else 2
+def made(folder):
     for n_people, n_strides in ((18, 53), (10, 30)):
         for n_cycles in (1, 3):
-            work = (delayed(study)(s, n_people, n_strides, n_cycles) for s in range(n_norms))
-            figures = np.array(Parallel(n_jobs)(work), dtype=float)
-            print(f"\n| norm of {n_people}, {n_cycles} stride(s) | " + " | ".join(COLUMNS) + " |")
-            print("|---" * (1 + len(COLUMNS)) + "|")
+            work = (delayed(study)(s, n_people, n_strides, n_cycles) for s in range(NORMS))
+            figures = np.array(Parallel(2)(work), dtype=float)
+            print_head(f"norm of {n_people}, {n_cycles} stride(s)", COLUMNS)
             for k, kind in enumerate(KINDS):
                 means = np.nanmean(figures[:, k], axis=0)
                 means[4] = np.nanmax(figures[:, k, 4])
-                print(f"| {kind} | " + " | ".join(f"{x:.1f}" for x in means) + " |", flush=True)
+                print_row(kind, [f"{x:.1f}" for x in means])
 
 
 if __name__ == "__main__":
-    main()
+    warnings.simplefilter("ignore")
+    run_tables({"made": made, "people": people}, command_line(__doc__))

@@ -70,7 +70,7 @@ def test_table_has_a_row_a_method(neuroscience, monkeypatch, capsys):
     monkeypatch.setattr(neuroscience, "PEERS", {})
     monkeypatch.setattr(neuroscience, "METHODS", {"as recorded": neuroscience.unaligned})
     neuroscience.main()
-    head, _, *rows = capsys.readouterr().out.splitlines()
+    head, _, *rows = capsys.readouterr().out.strip().splitlines()
     assert head.split(" | ")[1:] == ["one knot", "shift", "no warp |"]
     assert [row.split(" | ")[0] for row in rows] == ["| true warps", "| as recorded"]
     true, recorded = ([float(x) for x in row.strip("| ").split(" | ")[1:]] for row in rows)
