@@ -128,7 +128,7 @@ def said_of(pipe, X):
     scores = [scorer(pipe, X) for scorer in (SpreadScorer(), FeatureHoldoutScorer())]
     model = ActionModelDisplay.from_estimator(pipe, X, features="pelvis_height")
     times, share = Match.from_estimator(pipe, X).times, MetricDisplay.from_estimator(pipe).share
-    return [scores, times, share, model.performances]
+    return [scores, times, share, model.groups[0].performances]
 
 
 @pytest.mark.parametrize("name", NESTINGS)
@@ -194,10 +194,10 @@ def test_displays_and_scorers_take_key_frames(nested, routing, few):
         model = ActionModelDisplay.from_estimator(pipe, few.data, keyframes=K, features=0)
         people = SkeletonDisplay.from_estimator(pipe, few.data, keyframes=K, azimuth=0, at=0.5)
     np.testing.assert_array_equal(match.times, expected.times)
-    np.testing.assert_array_equal(display.times, expected.times)
+    np.testing.assert_array_equal(display.match.times, expected.times)
     after = sync.transform(points, keyframes=K)[:, :, :1]
     np.testing.assert_array_equal(display.after, after)
-    np.testing.assert_array_equal(model.performances, after)
+    np.testing.assert_array_equal(model.groups[0].performances, after)
     assert len(people.axes_) == 2
 
 

@@ -161,12 +161,14 @@ def test_model_displays_show_the_channel_beside_postures(bunch):
     for band in ("points", "performances"):
         display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features, band=band)
         offsets = Match.from_estimator(pipe, bunch.data).offsets_in("percent")
-        np.testing.assert_allclose(display.performances[:, :, 0], offsets)
-        np.testing.assert_allclose(display.mean[:, 0], offsets.mean(axis=0))
+        np.testing.assert_allclose(display.groups[0].performances[:, :, 0], offsets)
+        np.testing.assert_allclose(display.groups[0].mean[:, 0], offsets.mean(axis=0))
         expected = ActionModelDisplay.from_estimator(
             plain, bunch.data, features="pelvis_height", band=band
         )
-        np.testing.assert_allclose(display.performances[:, :, 1:], expected.performances)
+        np.testing.assert_allclose(
+            display.groups[0].performances[:, :, 1:], expected.groups[0].performances
+        )
     # A limb varies by what the aSpace leaves out, too; the channel does not.
     strange = [*bunch.data[:2], bunch.data[2][::-1]]
     found = find_departures(pipe, strange, features="offset", limit=0.1)

@@ -57,7 +57,7 @@ def test_keyframes_are_routed_past_a_union(union, routing):
         match = Match.from_estimator(pipe, BUNCH.data, keyframes=K)
         display = SynchronizationDisplay.from_estimator(pipe, BUNCH.data, keyframes=K)
         score = SpreadScorer()(pipe, BUNCH.data, keyframes=K)
-    for times in (match.times, display.times):
+    for times in (match.times, display.match.times):
         np.testing.assert_array_equal(times, expected.times)
     assert score == SpreadScorer()(pipe[-1], points, keyframes=K)
 
