@@ -34,8 +34,10 @@ def texts(axis):
     ("unit", "scale"), [("frames", 1), ("percent", 100 / 60), ("seconds", None)]
 )
 def test_lines_on_the_clock_and_ticks_of_trials(sync, unit, scale):
-    given = {"features": [0, 1], "unit": unit, "frame_rate": 100}
-    display = SynchronizationDisplay.from_estimator(sync, X, keyframes=K, **given)
+    params = {"keyframes": K}
+    if unit == "seconds":
+        params = {"keyframes": K / 100, "frame_rate": 100}
+    display = SynchronizationDisplay.from_estimator(sync, X, features=[0, 1], unit=unit, **params)
     scale = np.median(LENGTHS - 1) / 100 / 60 if scale is None else scale
     # Two panels of features and that of the warps.
     assert len(display.keyframes_) == 3

@@ -79,13 +79,15 @@ def test_noise_averages_out_over_features():
     assert noise_width(still) == pytest.approx(noise_width(one))
 
 
-def test_width_has_no_unit_and_grows_with_the_noise_up_to_the_widest():
+def test_width_has_no_unit_and_grows_with_the_noise():
     widths = [noise_width(curves(12, noise)) for noise in (0.0, 0.01, 0.05, 2.0)]
     assert widths[0] == 0
-    assert widths[-1] == 0.04 * (P - 1)
+    # Of noise alone, in two features, whose velocities were smoothed by 2 % of the clip.
+    widest = 0.02 * (P - 1) * np.cbrt(100 / np.sqrt(2))
+    assert 0.9 * widest < widths[-1] < widest
     assert (np.diff(widths) > 0).all()
     assert noise_width(1000 * curves(12, 0.05) + 5) == pytest.approx(widths[2])
-    assert noise_width(np.ones((3, P, 2))) == 0.04 * (P - 1)
+    assert noise_width(np.ones((3, P, 2))) == 0
 
 
 def test_a_sharp_peak_is_no_noise():
