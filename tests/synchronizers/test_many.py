@@ -107,7 +107,9 @@ def test_portions_change_nothing(monkeypatch, settings, n_jobs):
     sync = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
     assert sync.pattern_index_ == expected.pattern_index_
     assert sync.mu_ == expected.mu_
-    np.testing.assert_array_equal(sync.global_distances_, expected.global_distances_)
+    # Single precision: products of one base and of several may round differently.
+    distances = sync.global_distances_
+    np.testing.assert_allclose(distances, expected.global_distances_, rtol=1e-9)
     np.testing.assert_array_equal(sync.exemplars_, expected.exemplars_)
     np.testing.assert_array_equal(sync.match(X[:9]).times, expected.match(X[:9]).times)
 
