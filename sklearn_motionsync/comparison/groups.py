@@ -53,6 +53,9 @@ class GroupComparison:
         What was compared, in words.
     unit : {"frames", "percent", "seconds"}
         Of start, end, peak, and of the sizes of timing.
+    smallest_p : float
+        That all arrangements of the people allow: 0.125 for four pairs. If it is above ``level``,
+        nothing can be found, and ``describe`` says so.
 
     Examples
     --------
@@ -77,6 +80,7 @@ class GroupComparison:
     level: float
     design: str
     unit: Unit
+    smallest_p: float
 
     def __repr__(self):
         return f"GroupComparison({self.describe()!r})"
@@ -103,9 +107,13 @@ class GroupComparison:
             What was compared, whether it differs, and three p-values.
         """
         aspects = self.clusters["what"].unique().tolist()
-        none = "they differ, in shape or in timing" if self.p_joint <= self.level else ""
+        none = "no difference is found"
+        if self.p_joint <= self.level:
+            none = "they differ, in shape or in timing"
+        elif self.smallest_p > self.level:
+            none = f"too few to find a difference, as no p can be below {self.smallest_p:.3g}"
         answer = {
-            (): none or "no difference is found",
+            (): none,
             ("shape",): "they differ in shape",
             ("timing",): "they differ in timing",
         }.get(tuple(sorted(aspects)), "they differ in shape and timing")
@@ -303,6 +311,7 @@ def compare_aligned(
         level=float(level),
         design=study.words,
         unit=aligned.unit,
+        smallest_p=study.smallest_p,
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,6 +131,26 @@ class Study:
         design = Design(np.ones((len(maker), 1)), flips=True)
         words = f"Regression within {len(maker)} people"
         return cls(design, maker, None, None, [], words)
+
+    @property
+    def smallest_p(self):
+        """The share of the arrangements of units that differ as much as the most extreme one.
+
+        With both signs flipped, with groups of one size exchanged, and with a symmetric covariate
+        reversed, units differ as much.
+        """
+        n = len(self.maker)
+        if self.design.flips:
+            return 2 / 2**n
+        if self.groups is not None:
+            sizes = np.bincount(self.groups).tolist()
+            alike = math.prod(map(math.factorial, Counter(sizes).values()))
+        else:
+            values = np.sort(self.covariate)
+            sizes = np.unique(values, return_counts=True)[1].tolist()
+            is_symmetric = np.allclose(values + values[::-1], values[0] + values[-1])
+            alike = 2 if is_symmetric else 1
+        return alike * math.prod(map(math.factorial, sizes)) / math.factorial(n)
 
     def size(self, values, what):
         """Direction in words, size, and its interval of 95 %, of a value a unit; NaN is unknown."""

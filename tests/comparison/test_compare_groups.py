@@ -1,5 +1,7 @@
 """compare_groups: statistics against SciPy and slow versions, answers, designs, refusals."""
 
+from itertools import permutations
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -392,3 +394,51 @@ def test_refused_arguments(given, message, few):
     X, sync = few
     with pytest.raises(ValueError, match=message):
         compare_groups(sync, X, **given)
+
+
+def share_of_most_extreme(statistics):
+    return np.isclose(statistics, max(statistics)).mean()
+
+
+def by_all_arrangements(groups=None, covariate=None):
+    """The share of arrangements that separate units as well as the best one."""
+    if groups is not None:
+        groups = np.array(groups)
+        arranged = [groups[list(order)] for order in permutations(range(len(groups)))]
+        return share_of_most_extreme(
+            [-sum(groups[labels == k].var() for k in set(groups)) for labels in arranged]
+        )
+    centred = np.array(covariate) - np.mean(covariate)
+    orders = permutations(range(len(centred)))
+    return share_of_most_extreme([abs(centred @ centred[list(order)]) for order in orders])
+
+
+@pytest.mark.parametrize(
+    "of",
+    [
+        {"groups": [0, 0, 1, 1]},
+        {"groups": [0, 0, 0, 1, 1]},
+        {"groups": [0, 0, 1, 1, 2, 2]},
+        {"covariate": [1.0, 2, 3, 4]},
+        {"covariate": [1.0, 2, 3, 7]},
+        {"covariate": [1.0, 1, 2, 5]},
+    ],
+)
+def test_smallest_p_is_that_of_all_arrangements(of):
+    given = {"groups": None, "covariate": None} | of
+    n = len(next(iter(of.values())))
+    study = Study.of(given["groups"], given["covariate"], None, False, n)
+    assert study.smallest_p == pytest.approx(by_all_arrangements(**of))
+
+
+def test_too_few_people_are_told_so():
+    """Of four pairs no p is below 0.125, however much they differ; of six it is 0.03."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, 50)
+    for n, words in ((4, "too few to find a difference, as no p can be below 0.125"), (6, "they")):
+        curves = [np.sin(6 * t) + 100 * k + rng.normal(0, 0.1) for _ in range(n) for k in (0, 1)]
+        X = [curve[:, np.newaxis] for curve in curves]
+        sync = LinearSynchronizer(50).fit(X)
+        people = np.repeat(np.arange(n), 2)
+        found = compare_groups(sync, X, ["a", "b"] * n, people=people, paired=True)
+        assert f": {words}" in found.describe()
+        assert found.smallest_p == 2 / 2**n
