@@ -303,15 +303,15 @@ def _correlation_time(arrays):
 
     Of arrays (n_frames_i, n_features), in standard units, with NaN where nothing was seen.
     """
-    seen, lag, before = [np.isfinite(z) for z in arrays], 1, 1.0
+    seen = [np.isfinite(z).astype(np.float64) for z in arrays]
     arrays = [np.where(s, z, 0) for z, s in zip(arrays, seen, strict=True)]
-    longest = max(map(len, arrays), default=0)
+    squares = [np.square(z) for z in arrays]
+    longest, lag, before = max(map(len, arrays), default=0), 1, 1.0
     while lag < longest:
         products = energy = 0.0
-        for z, s in zip(arrays, seen, strict=True):
-            early, late = z[:-lag], z[lag:]
-            products += np.vdot(early, late)
-            energy += np.square(early)[s[lag:]].sum() / 2 + np.square(late)[s[:-lag]].sum() / 2
+        for z, s, e in zip(arrays, seen, squares, strict=True):
+            products += np.vdot(z[:-lag], z[lag:])
+            energy += (np.vdot(e[:-lag], s[lag:]) + np.vdot(e[lag:], s[:-lag])) / 2
         now = products / energy if energy > CONSTANT else 1.0
         if now < 1 / np.e:
             if lag == 1:
