@@ -24,7 +24,7 @@ def test_key_moments_of_people_are_missed_as_without_gaps(gaps, real_data):
     kept = {"depositFloorR", "grabHighR", "jogLeftCircle4StepsRstart", "pickUp", "standUp"}
     events = [event for event in gaps.JUDGED if event.action in kept]
     actions = gaps.read_actions(real_data, events)
-    people = [gaps.People(action, patterns=3) for action in actions]
+    people = [gaps.People(action, patterns=2) for action in actions]
     ways = {name: gaps.WAYS[name] for name in ("as they are", "mean")}
     spaces = ("cosines",)
     found = gaps.compare(people, actions, None, 0, {"": gaps.as_they_are}, spaces)
