@@ -177,6 +177,7 @@ def compare_groups(
         Of places and offsets. In seconds the template lasts as long as the median performance.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second of X, for seconds; by default what tables tell, as in `Match.offsets_in`.
+        Key-frames are then in seconds, as for ``match``.
     random_state : int, RandomState instance or None, default=0
         Draws the permutations.
     n_jobs : int, default=None

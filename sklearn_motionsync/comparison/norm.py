@@ -173,7 +173,8 @@ def compare_to_norm(
     unit : {"percent", "frames", "seconds"}, default="percent"
         Of places and offsets.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
-        Frames a second of X, for seconds; by default what tables tell.
+        Frames a second of X, for seconds; by default what tables tell. Key-frames are then in
+        seconds, as for ``match``.
     **params : dict
         What synchronizing X takes besides, such as ``keyframes``.
 

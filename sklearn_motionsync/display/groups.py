@@ -191,7 +191,8 @@ class GroupDisplay:
         unit : {"frames", "percent", "seconds"}, default="percent"
             Unit of time, as in `compare_groups`.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X, for seconds; by default what tables tell.
+            Frames a second of X, for seconds; by default what tables tell. Key-frames are then in
+            seconds, as for ``match``.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None

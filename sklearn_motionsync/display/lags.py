@@ -113,8 +113,8 @@ class LagDisplay:
         colorbar : bool, default=True
             Whether to draw a scale of the map.
         **params : dict
-            Further arguments of the steps before the synchronizer. With key-frames call ``lags``
-            of the synchronizer, and draw what it returns by `from_predictions`.
+            Further arguments of the steps before the synchronizer. Key-frames are of the whole
+            body, and lags do not depend on them.
 
         Returns
         -------

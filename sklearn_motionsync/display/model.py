@@ -171,7 +171,8 @@ class ActionModelDisplay:
             as long as the median performance of X.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X as recorded, for seconds, by default what tables tell, as in
-            `Match.to_frame`; without X those of the clock.
+            `Match.to_frame`; without X those of the clock. Key-frames are then in seconds, as for
+            ``match``.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         keyframe_lines : bool, default=True

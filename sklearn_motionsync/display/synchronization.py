@@ -198,7 +198,7 @@ class SynchronizationDisplay:
             the performances as recorded, and of the median performance on the clock.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X, for seconds; by default what tables tell, as in
-            `Match.to_frame`.
+            `Match.to_frame`. Key-frames are then in seconds, as for ``match``.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         warps : bool, default=True

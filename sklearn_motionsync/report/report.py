@@ -109,7 +109,7 @@ def write_report(
         Of time, as in `compare_groups`.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second of X; by default what tables tell, as in `Match.offsets_in`. If it is known,
-        durations are in seconds.
+        durations are in seconds. Where it is given, key-frames are in seconds, as for ``match``.
     random_state : int, RandomState instance or None, default=0
         Draws the permutations of the test.
     **params : dict

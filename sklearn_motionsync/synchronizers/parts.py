@@ -297,7 +297,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         *,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
-        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
     ) -> Lags:
         """How much later than the rest of the body each part is, at every frame of the pattern.
 
@@ -322,8 +321,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames per second of X, for seconds; by default what tables tell, as in
             `Match.to_frame`.
-        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of the whole body, as for ``fit``: in seconds with ``frame_rate``.
 
         Returns
         -------
@@ -344,8 +341,9 @@ class PartSynchronizer(AnchoredSynchronizer):
         people = None
         if groups is not None:
             groups, people = encode_groups(groups, len(performances))
-        body = self.match(performances, **self._given(X, keyframes, frame_rate))
-        matches = self._match_parts(performances, body, self._warpers, free=True)
+        # Free of coupling, no part is drawn to the body, and its warp is not needed.
+        even = np.tile(np.arange(self.n_frames_, dtype=np.float64), (len(performances), 1))
+        matches = self._match_parts(performances, Match(even), self._warpers, free=True)
         lengths, rates = [len(x) for x in performances], rates_of(X, frame_rate, unit)
         offsets = {}
         for name, match in matches.items():
