@@ -1,9 +1,8 @@
 """Measures of how well performances are synchronised, and scorers for grid searches."""
 
 from .measures import group_timing_error, keyframe_error, timing_error
-from .phase import amplitude_phase_variance
 from .scorers import FeatureHoldoutScorer, SpreadScorer
-from .spread import least_squares, sobolev_least_squares
+from .spread import amplitude_phase_variance, least_squares, sobolev_least_squares
 
 __all__ = [
     "FeatureHoldoutScorer",

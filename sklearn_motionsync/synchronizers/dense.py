@@ -25,21 +25,19 @@ from ..matching.anchors import add_ramps, pin
 from ..matching.costs import COSTS
 from ..matching.gaps import add_weights
 from ..matching.sharpening import Sharpener
-from ..matching.warps import normalise, sample
+from ..matching.warps import normalise
 from ..utils.parallel import one_blas_thread
-from .anchored import AnchoredSynchronizer
-from .gaps import with_confidence
+from .base import AnchoredSynchronizer
 from .intervals import calibrated_factor, intervals_of
 from .learning import (
-    choose_pattern,
     finish_warps,
     learn_metric,
     let_exemplars_vote,
     match_pairs,
+    warp_in_portions,
 )
 from .match import Match
-from .portions import warp_in_portions
-from .training import check_pattern, draw_sample
+from .training import check_pattern, draw_sample, pattern_of
 
 __all__ = ["DenseSynchronizer"]
 
@@ -231,7 +229,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
        Both ends are pinned, and the local rate is between 0 and ``max_rate``. The points x are
        velocities and poses in the metric (see ``cost``). All pairs are matched, or of more than 100
        trials each with 100 drawn ones.
-    4. ``learning.choose_pattern``: the template is the trial with the smallest sum ``C_n = sum_m
+    4. ``training.pattern_of``: the template is the trial with the smallest sum ``C_n = sum_m
        D_{n,m}`` (Eq. 19), the "median".
     5. ``learning.let_exemplars_vote``: some typical trials, the exemplars, vote. The template is
        matched to a trial directly, and by way of each exemplar. The median of these paths outvotes
@@ -285,7 +283,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
     }
 
     metric_: Any
-    _finite = "allow-nan"
     _SMALLER = "fewer frames or performances. Or learn from some: max_fit=1000"
 
     def __init__(
@@ -378,7 +375,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
                 progress=progress,
             )
             # 4. The trial with the smallest sum of distances is the pattern (Eq. 19).
-            chosen = choose_pattern(training, pattern, pairs)
+            chosen = pattern_of(training, pattern, pairs.median)
             # 5. Exemplars vote.
             vote = let_exemplars_vote(clock, training, chosen, pairs, self.consensus)
             # 6. Warps are sharpened or refined.
@@ -411,8 +408,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
             "_warper": final.warper,
         }
 
-    def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        performances = with_confidence(performances, confidence)
+    def _match(self, performances, keyframes=None, frame_rate=None):
         arrays, shares = self._for_warper(performances, keyframes, frame_rate)
         distances, times = self._distances_and_times(arrays, shares)
         distances = self._warper.matcher.features.back(distances)
@@ -463,12 +459,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
         match = self._match(performances)
         self.interval_factor_ *= calibrated_factor(match, self.keyframes_, frames)
         return self
-
-    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        performances = with_confidence(performances, confidence)
-        arrays, shares = self._for_warper(performances, keyframes, frame_rate)
-        times = np.maximum.accumulate(self._distances_and_times(arrays, shares)[1], axis=1)
-        return sample(performances, times, self.n_frames_)
 
     def _for_warper(self, trials, keyframes=None, frame_rate=None):
         """Trials as the warper takes them, and their key-frames as shares, or None."""

@@ -1,14 +1,18 @@
-"""The steps 2 to 6 of the fit of a `DenseSynchronizer`: each a function of values.
+"""The steps 2, 3, 5 and 6 of the fit of a `DenseSynchronizer`: each a function of values.
 
-Step 1, linear normalisation, is `training.put_on_clock`, which all synchronizers share.
+The steps 1 and 4, linear normalisation and the pattern, are `training.put_on_clock` and
+`training.pattern_of`, which all synchronizers share. Matches of many trials are shared out among
+jobs in portions of constant sizes, so that no result depends on the number of jobs.
 """
 
+import warnings
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from sklearn.utils import Bunch, check_random_state
 
+from ..inputs.wording import counted
 from ..matching.anchors import add_ramps, first_meeting
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
@@ -25,19 +29,19 @@ from ..matching.matcher import (
 from ..matching.median import Median, draw_references, median_of_sums, rounding_bound
 from ..matching.refinement import SAME_SOURCE, Refiner, unexplained_variance
 from ..matching.sharpening import Sharpener
-from ..matching.warps import sample
-from .evidence import weigh_evidence
-from .gaps import known_whole
-from .portions import refuse_long_paths, sums_in_portions
-from .training import pattern_of, warn_of_one_feature
+from ..matching.trellis import TILE_BASES
+from ..matching.warps import even_slices, sample
+from ..utils.parallel import SharedArgument, one_blas_thread, run
+from .training import known_whole, warn_of_one_feature
 
 __all__ = [
     "MOST_LEARNT",
-    "choose_pattern",
+    "SynchronizationWarning",
     "finish_warps",
     "learn_metric",
     "let_exemplars_vote",
     "match_pairs",
+    "warp_in_portions",
 ]
 
 # max_offset="auto". A wide band leads paths astray without a learnt metric; with one, gestures
@@ -192,26 +196,6 @@ def _energy_shares(features, compared):
         total = plain.sum(axis=(0, 1), dtype=np.float64)
         energy = np.maximum(energy - total**2 / plain[:, :, 0].size, 0)
     return energy / (energy.sum() or 1.0)
-
-
-# -- step 4: the pattern ------------------------------------------------------------------------
-
-
-def choose_pattern(training, pattern, pairs):
-    """Choose the pattern: the trial with the smallest sum of distances, or the one that is given.
-
-    Parameters
-    ----------
-    training : TrainingSet
-    pattern : "median", int or ndarray
-        As checked.
-    pairs : PairsStep
-
-    Returns
-    -------
-    Pattern
-    """
-    return pattern_of(training, pattern, pairs.median if isinstance(pattern, str) else None)
 
 
 # -- step 5: exemplars vote -----------------------------------------------------------------------
@@ -376,3 +360,200 @@ def _unexplained(clock, training, pattern, vote):
     aligned = clock.unit(sample(trials, times, clock.n_frames))
     noise = white_noise([pattern.array, *trials]) / clock.unit.size**2
     return unexplained_variance(warper.pattern, aligned, noise)
+
+
+# -- whether the warps of a training set agree with each other ------------------------------
+
+# Warps explain little if matching leaves more of the differences, and the inconsistency is larger,
+# too. So many trials are enough to tell. Measured in docs/design.md.
+_REMAINING, _INCONSISTENT, _ENOUGH = 0.7, 0.4, 10
+
+
+class SynchronizationWarning(UserWarning):
+    """The trials do not support their warps: these explain little, and contradict each other.
+
+    See ``evidence_`` of `DenseSynchronizer`.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import numpy as np
+    >>> from sklearn_motionsync import DenseSynchronizer, SynchronizationWarning
+    >>> noise = np.random.default_rng(0).standard_normal((12, 60, 3))
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always", SynchronizationWarning)
+    ...     sync = DenseSynchronizer().fit(noise)
+    >>> [each.category.__name__ for each in caught]
+    ['SynchronizationWarning']
+    >>> sync.evidence_.weak
+    True
+    """
+
+
+def weigh_evidence(evidence, n_trials):
+    """Whether warps explain little, by the evidence; warns if they do.
+
+    Parameters
+    ----------
+    evidence : Evidence or None
+        Of the training set. None if there is no metric.
+    n_trials : int
+        The number of trials it is from.
+
+    Returns
+    -------
+    Bunch
+        ``remaining``, ``inconsistency``, ``weak``.
+    """
+    if evidence is None:
+        return Bunch(remaining=np.nan, inconsistency=np.nan, weak=False)
+    remaining, inconsistency = evidence.remaining, evidence.inconsistency
+    weak = n_trials >= _ENOUGH and remaining > _REMAINING and inconsistency > _INCONSISTENT
+    if weak:
+        warnings.warn(
+            f"Matching leaves {remaining:.0%} of the differences between these performances, and "
+            "by way of a third performance a moment lands "
+            f"{inconsistency:.2f} times a typical offset away (evidence_; {_REMAINING:.0%} and "
+            f"{_INCONSISTENT} are the limits): the warps explain little. Compare them with "
+            "LinearSynchronizer, and check that all show one movement, cut at the same moments. "
+            "Less noise helps, and so do features that show the movement.",
+            SynchronizationWarning,
+            stacklevel=2,
+        )
+    return Bunch(remaining=remaining, inconsistency=inconsistency, weak=bool(weak))
+
+
+# -- matches of many trials in portions, shared out among jobs ----------------------------
+
+# Sizes of a portion: worth sending to another process, and small enough to share out.
+PORTION_CELLS = 50_000_000
+_PORTION_TRIALS = 256
+# Most steps of a path at a frame, all offsets together.
+_MOST_STEPS = 1e9
+
+
+def refuse_long_paths(settings, n_frames):
+    """Refuse a trellis that takes too long."""
+    steps = min(settings.max_rate, n_frames - 1) + 1
+    steps *= 2 * settings.max_offset * n_frames + 1
+    if steps > _MOST_STEPS:
+        raise ValueError(
+            f"max_rate = {settings.max_rate} and max_offset = {settings.max_offset} on {n_frames} "
+            f"frames ask for {steps:.0e} steps of a path at every frame of every pair; "
+            f"{_MOST_STEPS:.0e} is the limit. Use a smaller rate or offset, or fewer frames."
+        )
+
+
+def sums_in_portions(matcher, positions, references, compared, *, n_jobs, progress):
+    """Sums of the distances of every trial, as the base, to references: (n_trials,).
+
+    Parameters
+    ----------
+    matcher : Matcher
+    positions : ndarray, shape (n_trials, P, n_columns)
+        In the unit.
+    references : ndarray of int
+        Indices of trials.
+    compared : ndarray, shape (n_references, n_frames, n_compared)
+        Their features.
+    n_jobs : int or None
+    progress : Progress
+    """
+    n_trials, n_references = len(positions), len(references)
+    cells = n_references * compared.shape[1] * (2 * matcher.trellis.width + 1)
+    size = min(TILE_BASES, max(1, PORTION_CELLS // cells))
+    slices = even_slices(n_trials, size)
+    name = f"comparing {n_trials} with {counted(n_references, 'performance')}"
+    step = progress.stage(name, len(slices))
+    if n_trials == n_references:
+        # The features of all trials are there.
+        portions = [(matcher, compared[rows], compared) for rows in slices]
+        blocks = run(_sums, portions, n_jobs=n_jobs, prefer="threads", step=step)
+    else:
+        common = SharedArgument(matcher), SharedArgument(positions), SharedArgument(compared)
+        portions = [(rows,) for rows in slices]
+        blocks = run(
+            _sums_of_rows, portions, common=common, n_jobs=n_jobs, prefer="threads", step=step
+        )
+    return np.concatenate(list(blocks))
+
+
+def _sums(matcher, bases, references):
+    return matcher.trellis.distances(bases, references).sum(axis=1, dtype=np.float64)
+
+
+def _sums_of_rows(matcher, positions, references, rows):
+    return _sums(matcher, matcher.features(positions[rows]), references)
+
+
+def warp_in_portions(warper, arrays, body_times=None, *, n_jobs, begin, name):
+    """Distances and times of trials, on the clock a portion at a time.
+
+    Parameters
+    ----------
+    warper : Warper
+    arrays : sequence of ndarray (n_frames_i, n_columns)
+        Workers are sent their own portions only.
+    body_times : ndarray, shape (n_trials, P), default=None
+        Warps of the whole body, to which the warper of a part couples it.
+    n_jobs : int or None
+    begin : callable
+        ``begin(fits=False)`` gives the `Progress` of a job of several portions.
+    name : str
+        Of its stage.
+
+    Returns
+    -------
+    distances : ndarray, shape (n_trials,)
+    times : ndarray, shape (n_trials, P)
+    """
+    arrays = list(arrays)
+    cells = len(warper.bases.sequences) * len(warper.pattern)
+    cells *= 2 * warper.matcher.trellis.width + 1
+    size = min(max(1, PORTION_CELLS // cells), _PORTION_TRIALS)
+    if len(arrays) <= size:
+        with one_blas_thread():
+            return _warps(warper, arrays, body_times)
+    slices = even_slices(len(arrays), size)
+    portions = [
+        (_Arrays(arrays[rows]), None if body_times is None else body_times[rows]) for rows in slices
+    ]
+    distances, times = np.empty(len(arrays)), np.empty((len(arrays), len(warper.pattern)))
+    with begin(fits=False) as progress:
+        step = progress.stage(name, len(slices))
+        results = run(_warps, portions, common=(SharedArgument(warper),), n_jobs=n_jobs, step=step)
+        for rows, (lengths, warps) in zip(slices, results, strict=True):
+            distances[rows], times[rows] = lengths, warps
+    return distances, times
+
+
+class _Arrays:
+    """Arrays that are sent to another process as one, made when they are sent.
+
+    No list: most versions of Dask send the items of a list to different workers.
+    """
+
+    def __init__(self, arrays):
+        self._arrays = arrays
+
+    def __iter__(self):
+        return iter(self._arrays)
+
+    def __sizeof__(self):
+        # By which joblib tells what Dask sends to a worker ahead of the call.
+        return sum(x.nbytes for x in self)
+
+    def __reduce__(self):
+        return _split, (np.concatenate(self._arrays), [len(x) for x in self])
+
+
+def _split(frames, lengths):
+    ends = np.cumsum(lengths)
+    return [frames[end - n : end] for end, n in zip(ends, lengths, strict=True)]
+
+
+def _warps(warper, arrays, body_times):
+    positions = warper.positions(arrays)
+    if body_times is None:
+        return warper.warps(positions)
+    return warper.warps(positions, body_times)

@@ -9,8 +9,7 @@ from ..matching.anchors import first_meeting
 from ..matching.sizes import BATCH
 from ..matching.warps import even_slices, normalise, sample
 from ..utils.pipelines import MissingMetadata
-from .anchored import AnchoredSynchronizer
-from .gaps import with_confidence
+from .base import AnchoredSynchronizer
 from .match import Match
 from .training import check_pattern
 
@@ -83,8 +82,6 @@ class LinearSynchronizer(AnchoredSynchronizer):
     [0.0, 1.5, 3.0, 3.5, 4.0]
     """
 
-    _finite = "allow-nan"
-
     def _given(self, X, keyframes, frame_rate, confidence=None):
         if keyframes is None and getattr(self, "keyframes_", None) is not None:
             raise MissingMetadata(
@@ -93,8 +90,7 @@ class LinearSynchronizer(AnchoredSynchronizer):
             )
         return super()._given(X, keyframes, frame_rate, confidence)
 
-    def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        performances = with_confidence(performances, confidence)
+    def _match(self, performances, keyframes=None, frame_rate=None):
         shares, n_frames = self._shares(performances, keyframes, frame_rate), self.n_frames_
         if shares is None:
             times = np.tile(np.arange(n_frames, dtype=np.float64), (len(performances), 1))

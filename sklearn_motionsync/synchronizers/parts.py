@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import NamedTuple, Self
 
 import numpy as np
 from sklearn.base import clone
 from sklearn.utils._param_validation import Interval
-from sklearn.utils.validation import check_is_fitted
 
 from ..body.limbs import parts_of_names, parts_of_postures
 from ..inputs.features import choose_features
@@ -19,7 +17,6 @@ from ..inputs.types import (
     Features,
     Indexed,
     Labels,
-    NumbersLike,
     PerformancesLike,
     SupportsArray,
     Unit,
@@ -36,13 +33,12 @@ from ..matching.warps import evaluate_warps, normalise
 from ..utils.groups import encode_groups
 from ..utils.parallel import Progress, one_blas_thread, run
 from ..utils.parameters import validated_with_nested
-from .anchored import AnchoredSynchronizer
+from .base import AnchoredSynchronizer
 from .dense import DenseSynchronizer
-from .gaps import with_confidence
 from .lags import Lags, common_delay, share_apart
-from .learning import MOST_LEARNT
+from .learning import MOST_LEARNT, warp_in_portions
 from .match import Match, rates_of
-from .portions import warp_in_portions
+from .training import with_confidence
 
 __all__ = ["PartSynchronizer"]
 
@@ -131,7 +127,8 @@ class PartSynchronizer(AnchoredSynchronizer):
     Notes
     -----
     ``match`` is that of the whole body, so scorers and displays give the same as for a
-    `DenseSynchronizer`.
+    `DenseSynchronizer`. Key-frames are those of the whole body, too, and a confidence weighs its
+    frames. Parts are coupled to its warp, and may be early or late.
 
     A part that hardly moves, such as the idle arm of a grab, carries no information about timing:
     without coupling its warp and its lag are random. `Lags.summary` shows this as a large spread.
@@ -169,8 +166,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         "synchronizer": [DenseSynchronizer, None],
     }
 
-    _finite = "allow-nan"
-
     def __init__(
         self,
         parts: Mapping[str, Features] | None = None,
@@ -182,86 +177,26 @@ class PartSynchronizer(AnchoredSynchronizer):
         self.synchronizer = synchronizer
 
     @validated_with_nested
-    def fit(
-        self,
-        X: PerformancesLike,
-        y: object = None,
-        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
-        frame_rate: float | ValuesLike | None = None,
-        confidence: Indexed[NumbersLike] | None = None,
-    ) -> Self:
-        """Learn the whole body, then every part.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-        y : ignored
-            Present for API consistency.
-        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of the whole body, as `DenseSynchronizer` takes them. Parts are coupled to
-            its warp, and may be early or late.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames per second of X. With it key-frames are seconds.
-        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
-            How sure it is what was seen, as `DenseSynchronizer` takes it. It weighs the frames of
-            the whole body.
-
-        Returns
-        -------
-        self : PartSynchronizer
-            The fitted synchronizer.
-
-        Raises
-        ------
-        ValueError
-            If the input breaks the contract, the pattern does not exist or fit, or there are no
-            such parts.
-        """
+    def _fit(self, X, keyframes, frame_rate, confidence):
         body = clone(DenseSynchronizer() if self.synchronizer is None else self.synchronizer)
         with self._progress(fits=True) as progress:
             with progress.fitting(body, "learning the body"):
                 training = fit_body(body, X, keyframes, frame_rate, confidence)
             parts = choose_parts(self.parts, training.trials, names_of_input(body))
-            learnt = learn_parts(body, training, parts, self.coupling, progress)
+            warpers, usual, apart = learn_parts(body, training, parts, self.coupling, progress)
         shared = {name: value for name, value in vars(body).items() if name in _SHARED}
         self.__dict__.pop("feature_names_in_", None)
         self.__dict__.update(
             shared,
             synchronizer_=body,
             parts_=parts,
-            _warpers=learnt.warpers,
-            _people=learnt.people,
+            _warpers=warpers,
+            _usual=usual,
+            _apart=apart,
         )
-        return self
 
-    def match(
-        self,
-        X: PerformancesLike,
-        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
-        frame_rate: float | ValuesLike | None = None,
-        confidence: Indexed[NumbersLike] | None = None,
-    ) -> Match:
-        """Match the whole body of performances to the pattern.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each performance, as for ``fit``.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            As for ``fit``.
-        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
-            As for ``fit``.
-
-        Returns
-        -------
-        Match
-            As from ``DenseSynchronizer.match``.
-        """
-        check_is_fitted(self)
-        return self.synchronizer_.match(X, keyframes, frame_rate, confidence)
+    def _match(self, performances, keyframes=None, frame_rate=None):
+        return self.synchronizer_.match(performances, keyframes, frame_rate)
 
     def match_parts(
         self,
@@ -347,13 +282,13 @@ class PartSynchronizer(AnchoredSynchronizer):
         lengths, rates = [len(x) for x in performances], rates_of(X, frame_rate, unit)
         offsets = {}
         for name, match in matches.items():
-            usual = self._usual(name, match).offsets_in(unit, lengths, rates)
-            offsets[name] = match.offsets_in(unit, lengths, rates) - usual
+            usual = Match(np.broadcast_to(self._usual[name], match.times.shape))
+            offsets[name] = match.offsets_in(unit, lengths, rates)
+            offsets[name] -= usual.offsets_in(unit, lengths, rates)
         moving = [name for name, warper in self._warpers.items() if warper is not None]
         # What does not move has no lag.
         lags = [
-            offsets[name]
-            - common_delay([offsets[x] for x in moving if x != name], self._people.apart)
+            offsets[name] - common_delay([offsets[x] for x in moving if x != name], self._apart)
             if name in moving
             else np.zeros_like(offsets[name])
             for name in self.parts_
@@ -369,10 +304,6 @@ class PartSynchronizer(AnchoredSynchronizer):
             columns = self.parts_[name]
             out[:, :, columns] = match.warp([x[:, columns] for x in performances])
         return out
-
-    def _usual(self, name, match):
-        """The mean warp of a part in the training set, as a match of as many performances."""
-        return Match(np.broadcast_to(self._people.times[name], match.times.shape))
 
     def _match_parts(self, performances, body, names, free=False):
         """Matches of parts by their names, perhaps free of the coupling to the body.
@@ -398,36 +329,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         return matches
 
 
-class PartsOfPeople(NamedTuple):
-    """How parts of training performances move.
-
-    Attributes
-    ----------
-    times : dict of str to ndarray (P,)
-        The mean warp of each part, and of the features of no part as ``"rest"``.
-    apart : float
-        As of `share_apart`.
-    """
-
-    times: dict
-    apart: float
-
-
-class LearntParts(NamedTuple):
-    """What is learnt of parts.
-
-    Attributes
-    ----------
-    warpers : dict of str to PartWarper or None
-        Of every part by name, and of all features of no part as ``"rest"``, if there are any. None
-        for what does not move, and for an infinite coupling.
-    people : PartsOfPeople
-    """
-
-    warpers: dict
-    people: PartsOfPeople
-
-
 def fit_body(self, X, keyframes, frame_rate, confidence):
     """Fit the synchronizer of the whole body, a `DenseSynchronizer`: its `TrainingSet`."""
     return self._fit(X, keyframes, frame_rate, confidence)
@@ -449,7 +350,13 @@ def learn_parts(self, training, parts, coupling, progress):
 
     Returns
     -------
-    LearntParts
+    warpers : dict of str to PartWarper or None
+        Of every part by name, and of all features of no part as ``"rest"``, if there are any. None
+        for what does not move, and for an infinite coupling.
+    usual : dict of str to ndarray (P,)
+        The mean warp of each of them.
+    apart : float
+        As of `share_apart`.
     """
     trials, warper, n_frames = training.trials, self._warper, self.n_frames_
     n_exemplars = len(warper.to_exemplars)
@@ -498,7 +405,7 @@ def learn_parts(self, training, parts, coupling, progress):
     mean = {name: each.mean(axis=0) for name, each in warps.items()}
     apart = [warps[name] - mean[name] for name in features_of if warpers[name] is not None]
     share = share_apart(np.stack(apart)) if apart else 1.0
-    return LearntParts(warpers, PartsOfPeople(mean, share))
+    return warpers, mean, share
 
 
 def choose_parts(parts, performances, names):

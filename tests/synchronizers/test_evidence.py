@@ -12,7 +12,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.metric import Evidence
-from sklearn_motionsync.synchronizers.evidence import weigh_evidence
+from sklearn_motionsync.synchronizers.learning import weigh_evidence
 
 P = 60
 

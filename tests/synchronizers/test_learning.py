@@ -12,14 +12,13 @@ from sklearn_motionsync import (
 from sklearn_motionsync.inputs.collections import Performances
 from sklearn_motionsync.synchronizers import learning
 from sklearn_motionsync.synchronizers.learning import (
-    choose_pattern,
     finish_warps,
     learn_metric,
     let_exemplars_vote,
     match_pairs,
+    warp_in_portions,
 )
-from sklearn_motionsync.synchronizers.portions import warp_in_portions
-from sklearn_motionsync.synchronizers.training import TrainingSet, put_on_clock
+from sklearn_motionsync.synchronizers.training import TrainingSet, pattern_of, put_on_clock
 from sklearn_motionsync.utils.parallel import Progress
 
 
@@ -63,7 +62,7 @@ def test_six_steps_by_hand_arrive_at_the_same_times(params):
         step = learn_metric(clock, **{name: settings[name] for name in names})
         jobs = {"random_state": 0, "n_jobs": None, "progress": progress}
         pairs = match_pairs(clock, step, True, trials=performances, names=None, **jobs)
-        pattern = choose_pattern(training, sync.pattern, pairs)
+        pattern = pattern_of(training, sync.pattern, pairs.median)
         vote = let_exemplars_vote(clock, training, pattern, pairs, sync.consensus)
         final = finish_warps(clock, training, pattern, vote, "auto")
         distances, times = warp_in_portions(
@@ -93,7 +92,7 @@ def test_steps_change_nothing_that_they_are_given():
     with Progress(DenseSynchronizer(), 0) as progress:
         jobs = {"random_state": 0, "n_jobs": None, "progress": progress}
         pairs = match_pairs(clock, step, True, trials=training.trials, names=None, **jobs)
-    pattern = choose_pattern(training, "median", pairs)
+    pattern = pattern_of(training, "median", pairs.median)
     vote = let_exemplars_vote(clock, training, pattern, pairs, 8)
     first, again = (finish_warps(clock, training, pattern, vote, "auto") for _ in range(2))
     assert first.unexplained == again.unexplained

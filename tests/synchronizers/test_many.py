@@ -17,7 +17,7 @@ from sklearn_motionsync import (
     to_frame,
 )
 from sklearn_motionsync.inputs import validation as reading
-from sklearn_motionsync.synchronizers import portions, training
+from sklearn_motionsync.synchronizers import learning, training
 
 from shift_synchronizer import ShiftSynchronizer
 
@@ -103,7 +103,7 @@ def test_paths_of_long_performances_take_little_memory(cost):
 def test_portions_change_nothing(monkeypatch, settings, n_jobs):
     X = walks(110, 20, dtype=np.float32)
     expected = DenseSynchronizer(**settings).fit(X)
-    monkeypatch.setattr(portions, "PORTION_CELLS", 20_000)
+    monkeypatch.setattr(learning, "PORTION_CELLS", 20_000)
     sync = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
     assert sync.pattern_index_ == expected.pattern_index_
     assert sync.mu_ == expected.mu_
