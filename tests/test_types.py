@@ -131,7 +131,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import *
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.io import keyframes_from_events, read_motion
-from sklearn_motionsync.metrics import FeatureHoldoutScorer, least_squares, timing_error
+from sklearn_motionsync.metrics import FeatureHoldoutScorer, group_timing_error, least_squares
 X = list(np.random.RandomState(0).standard_normal((3, 20, 2)).cumsum(axis=1))
 tables = [pd.DataFrame(x) for x in X]
 sync = LinearSynchronizer().fit(X)
@@ -171,7 +171,7 @@ DirectionCosines(Skeleton.paper(), hidden="nan")
 FrameWise(sync)
 PartSynchronizer({"arm": [0], "leg": [1]}, synchronizer=DenseSynchronizer(n_frames=20))
 FeatureHoldoutScorer(2)(sync, X) + least_squares(np.stack(X), np.stack(X))
-timing_error(sync.match(X).times, sync.match(X).times.tolist(), quantile=0.9)
+group_timing_error(sync.match(X).times.tolist(), [[0, 0.5, 1]] * 3)
 make_gait(2, takes=True).data[0].shape
 partial(read_motion, "trial.amc", asf="trial.asf")
 to_sequences(pd.DataFrame({"trial": [1, 1, 2, 2], "x": [0.0, 1, 0, 1]}), by="trial")

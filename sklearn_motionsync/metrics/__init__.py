@@ -1,6 +1,6 @@
 """Measures of how well performances are synchronised, and scorers for grid searches."""
 
-from .measures import group_timing_error, keyframe_error, timing_error
+from .measures import group_timing_error, keyframe_error
 from .scorers import FeatureHoldoutScorer, SpreadScorer
 from .spread import amplitude_phase_variance, least_squares, sobolev_least_squares
 
@@ -12,5 +12,4 @@ __all__ = [
     "keyframe_error",
     "least_squares",
     "sobolev_least_squares",
-    "timing_error",
 ]

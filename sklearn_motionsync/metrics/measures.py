@@ -19,56 +19,15 @@ from ..matching.warps import evaluate_warps
 __all__ = [
     "group_timing_error",
     "keyframe_error",
-    "timing_error",
 ]
 
 # Rounding of warps, in frames: bounds may be exceeded by as much.
 _ROUNDING = 1e-9
 
-# -- timing errors against known warps, moments and key-frames -----------------------------
-
-
-def timing_error(
-    times: NumbersLike, true_times: NumbersLike, *, quantile: float | None = None
-) -> float:
-    """Mean absolute difference of warps from known ones, in frames of the clock.
-
-    ``mean_{m,p} |tau_m(p) - tau*_m(p)|``
-
-    Parameters
-    ----------
-    times, true_times : array-like, shape (n_sequences, P)
-        Warps, and the known ones, from 0 to P - 1.
-    quantile : float in [0, 1], default=None
-        Return this quantile of the differences instead of their mean.
-
-    Returns
-    -------
-    float
-        The error in frames of the clock.
-
-    Raises
-    ------
-    ValueError
-        If times are not all from 0 to P - 1 or differ in shape, or for a quantile beyond 0 and 1.
-
-    Examples
-    --------
-    >>> from sklearn_motionsync.metrics import timing_error
-    >>> timing_error([[0, 1.5, 2, 3]], [[0, 1, 1.5, 3]])
-    0.25
-    """
-    times, true_times = _as_warps(times), _as_warps(true_times, "true_times")
-    if times.shape != true_times.shape:
-        raise ValueError(f"times {times.shape} and true_times {true_times.shape} differ in shape.")
-    return _summary(np.abs(times - true_times), quantile)
-
 
 def group_timing_error(
     times: NumbersLike,
     moments: Indexed[ValuesLike],
-    *,
-    quantile: float | None = None,
 ) -> float:
     """Mean absolute difference of the moments that a group shows at the same frame of the clock.
 
@@ -84,8 +43,6 @@ def group_timing_error(
     moments : list of array-like (n_frames_i,)
         ``phi``, from 0 to 1 and never decreasing, at the performances' own frames, such as
         ``make_bending().times``.
-    quantile : float in [0, 1], default=None
-        Return this quantile of the differences instead of their mean.
 
     Returns
     -------
@@ -113,7 +70,7 @@ def group_timing_error(
             for tau, phi in zip(times, moments, strict=True)
         ]
     )
-    return last * _summary(np.abs(shown - shown.mean(axis=0)), quantile)
+    return float(last * np.abs(shown - shown.mean(axis=0)).mean())
 
 
 def keyframe_error(
@@ -123,7 +80,6 @@ def keyframe_error(
     n_frames: ValuesLike,
     *,
     frame_rate: float | ValuesLike | None = None,
-    quantile: float | None = None,
 ) -> float:
     """Mean absolute difference between matched and true key-frames.
 
@@ -142,8 +98,6 @@ def keyframe_error(
         Lengths of the performances, at least 2.
     frame_rate : float or array-like of shape (n_sequences,), default=None
         Frames a second of the performances. If given, the error is in seconds.
-    quantile : float in [0, 1], default=None
-        Return this quantile of the differences instead of their mean.
 
     Returns
     -------
@@ -173,27 +127,18 @@ def keyframe_error(
     errors = np.abs(matched - keyframes / frames_per_step)
     if frame_rate is not None:
         errors = errors * frames_per_step / as_frame_rates(frame_rate, n_sequences)
-    return _summary(errors, quantile)
-
-
-def _summary(errors, quantile):
-    if quantile is None:
-        return float(errors.mean())
-    number = as_numbers(quantile, "quantile", dtype=np.float64)
-    if number.ndim != 0 or not 0 <= number <= 1:
-        raise ValueError(f"quantile must be a number from 0 to 1, or None, got {quantile!r}.")
-    return float(np.quantile(errors, number))
+    return float(errors.mean())
 
 
 # -- checks of arguments ------------------------------------------------------------------
 
 
-def _as_warps(times, what="times") -> np.ndarray:
+def _as_warps(times) -> np.ndarray:
     """Warps (n_sequences >= 1, P >= 2), from 0 to P - 1."""
-    times = as_numbers(times, what, dtype=np.float64)
+    times = as_numbers(times, "times", dtype=np.float64)
     if times.ndim != 2 or times.shape[0] < 1 or times.shape[1] < 2:
         raise ValueError(
-            f"{what} must have shape (n_sequences, P), one row a performance and P at least 2, "
+            "times must have shape (n_sequences, P), one row a performance and P at least 2, "
             f"got {times.shape}."
         )
     last = times.shape[1] - 1
@@ -201,7 +146,7 @@ def _as_warps(times, what="times") -> np.ndarray:
     if not inside.all():
         i, p = np.argwhere(~inside)[0]
         raise ValueError(
-            f"Performance {i}: {what} must be from 0 to P - 1 = {last}, in frames of the clock, "
+            f"Performance {i}: times must be from 0 to P - 1 = {last}, in frames of the clock, "
             f"got {times[i, p]:.10g} at frame {p}."
         )
     return np.clip(times, 0, last)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from measure_cases import CASES, CURVES, FIVE, STRAIGHT, WARPS, make_curves
+from measure_cases import CASES, CURVES, FIVE, WARPS, make_curves
 from sklearn_motionsync import metrics, to_frame
 from sklearn_motionsync.metrics import (
     amplitude_phase_variance,
@@ -15,7 +15,6 @@ from sklearn_motionsync.metrics import (
     keyframe_error,
     least_squares,
     sobolev_least_squares,
-    timing_error,
 )
 
 REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference.md"
@@ -59,10 +58,7 @@ def test_measure_refuses_wrong_arguments(name, arguments, keywords, message):
 # -- warps --------------------------------------------------------------------------------
 
 
-def test_quantile_and_frame_rate():
-    errors = np.abs(WARPS - STRAIGHT)
-    expected = np.percentile(errors, 95)
-    np.testing.assert_allclose(timing_error(WARPS, STRAIGHT, quantile=0.95), expected)
+def test_frame_rate():
     arguments, oracle, _ = CASES["keyframe_error"]
     expected = oracle(*arguments, frame_rate=50)
     np.testing.assert_allclose(keyframe_error(*arguments, frame_rate=50), expected)
@@ -83,10 +79,9 @@ def test_group_timing_error_is_zero_for_true_warps_to_any_clock(bending):
 
 
 def test_closed_forms_of_warps():
-    assert timing_error(WARPS, WARPS) == 0
     assert keyframe_error(FIVE, [[0, 8]], [0, 4], [9]) == 0
     # Warps may decrease.
-    assert timing_error([[0, 2, 1, 3, 4]], FIVE) == pytest.approx(0.4)
+    assert keyframe_error([[0, 2, 1, 3, 4]], [[2]], [1], [9]) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("name", [n for n, case in CASES.items() if case.arguments[0] is WARPS])
