@@ -26,13 +26,10 @@ __all__ = [
     "at_frames",
     "blend_bodies",
     "blend_numbers",
-    "blend_postures",
     "find_stances",
     "hold_feet",
 ]
 
-# A shorter vector of cosines in a posture has no direction.
-_LEAST_NORM = 1e-6
 # A shorter link, in sizes of the body, has no direction.
 _LEAST_LENGTH = 1e-6
 # A link whose length changes by a smaller share is rigid.
@@ -63,22 +60,7 @@ def blend_numbers(arrays, frames, weights):
     return sum((at_frames(x, f).T * w).T for x, f, w in pairs)
 
 
-def blend_postures(arrays, frames, weights, first, n_dims):
-    """Blends of postures: after the first columns, directions of limbs, ``n_dims`` columns each.
-
-    A limb that has length 0 in any frame, such as hips seen end-on, is blended linearly.
-    """
-    linear = blend_numbers(arrays, frames, weights)
-    limbs = [x[:, first:].reshape(len(x), -1, n_dims) for x in arrays]
-    directed = np.all(
-        [(np.linalg.norm(x, axis=2) > _LEAST_NORM).all(axis=0) for x in limbs], axis=0
-    )
-    out = linear[:, first:].reshape(len(linear), -1, n_dims)
-    out[:, directed] = _blend_vectors([x[:, directed] for x in limbs], frames, weights)
-    return linear
-
-
-def blend_bodies(arrays, frames, weights, skeleton, owner=None):
+def blend_bodies(arrays, frames, weights, skeleton):
     """Blends of joint positions, in space with feet that stand.
 
     Parameters
@@ -87,8 +69,6 @@ def blend_bodies(arrays, frames, weights, skeleton, owner=None):
         Checked, of one unit.
     frames, weights : as for `blend_numbers`
     skeleton : Skeleton
-    owner : int, default=None
-        The performance whose size and limb lengths the blend has; by default they are blended.
 
     Returns
     -------
@@ -97,15 +77,12 @@ def blend_bodies(arrays, frames, weights, skeleton, owner=None):
     structure = LinkStructure(skeleton)
     figures = [structure.decompose(x) for x in arrays]
     directed = structure.directed_links(figures)
-    sizes = np.array([x.size for x in figures])
-    size = mean_length(sizes[:, np.newaxis], weights)
-    if owner is not None:
-        size = np.full(len(size), sizes[owner])
+    size = mean_length(np.array([[x.size] for x in figures]), weights)
     # Places and links are blended in units of the body.
     links = blend_numbers([x.links / x.size for x in figures], frames, weights)
     links *= size[:, np.newaxis, np.newaxis]
     limbs = [x.links[:, directed] for x in figures]
-    links[:, directed] = _blend_vectors(limbs, frames, weights, owner)
+    links[:, directed] = _blend_vectors(limbs, frames, weights)
     angle, place = _blend_path(figures, frames, weights, size)
     place[:, 1] = _blend_heights([x.place[:, 1] for x in figures], figures, frames, weights, size)
     foot = _blend_heights([x.foot for x in figures], figures, frames, weights, size)
@@ -134,18 +111,14 @@ def _neighbours(x, frames):
     return left, frames - left
 
 
-def _blend_vectors(arrays, frames, weights, owner=None):
-    """Vectors (n_frames_i, n_links, n_dims) blended in direction, and unless owned in length."""
+def _blend_vectors(arrays, frames, weights):
+    """Vectors (n_frames_i, n_links, n_dims) blended in direction and in length."""
     vectors = []
     for x, f in zip(arrays, frames, strict=True):
         left, share = _neighbours(x, f)
         pair, shares = np.stack([x[left], x[left + 1]]), np.stack([1 - share, share])
         vectors.append(mean_vector(pair, shares[..., np.newaxis]))
-    vectors, weights = np.stack(vectors), weights[..., np.newaxis]
-    if owner is None:
-        return mean_vector(vectors, weights)
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return mean_direction(vectors / lengths, weights) * lengths[owner]
+    return mean_vector(np.stack(vectors), weights[..., np.newaxis])
 
 
 def _blend_path(figures, frames, weights, size):

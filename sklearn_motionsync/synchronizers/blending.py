@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from numbers import Integral
 from typing import Any
 
@@ -11,13 +11,12 @@ import pandas as pd
 from sklearn.base import BaseEstimator
 
 from ..body.base import PositionsTransformer
-from ..body.blends import blend_bodies, blend_numbers, blend_postures
-from ..body.direction_cosines import DirectionCosines
+from ..body.blends import blend_bodies, blend_numbers
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
 from ..inputs.facts import compare_facts
-from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.tables import FRAME, labels_of
 from ..inputs.types import NumbersLike, PerformancesLike
@@ -43,8 +42,7 @@ def blend_performances(
     weights: NumbersLike | Mapping[Any, float],
     *,
     timing: NumbersLike | Mapping[Any, float] | None = None,
-    skeleton: Skeleton | DirectionCosines | None = None,
-    lengths_of: Hashable = None,
+    skeleton: Skeleton | None = None,
     **params: Any,
 ) -> np.ndarray | pd.DataFrame:
     """Blend performances: a weighted mean of their postures and of their timing.
@@ -55,10 +53,9 @@ def blend_performances(
 
     Joint positions are blended as bodies. Directions of limbs and bones, along axes that turn with
     each body, have the mean on the sphere with the smallest sum of squared angles, so that no limb
-    becomes shorter. Lengths of limbs are averaged, or those of one performance. Headings have a
-    circular mean, and steps of the path are averaged along each body's heading. So are heights of
-    the pelvis. Feet that stand in the performances stand in the blend: the body follows them, and
-    hips and knees bend by the rest.
+    becomes shorter. Lengths of limbs are averaged. Headings have a circular mean, and steps of the
+    path are averaged along each body's heading. So are heights of the pelvis. Feet that stand in
+    the performances stand in the blend: the body follows them, and hips and knees bend by the rest.
 
     Parameters
     ----------
@@ -76,13 +73,9 @@ def blend_performances(
         the first. A dict has the weights of some performances by index or label.
     timing : array-like or dict, as weights, default=None
         Weights of the timing; by default ``weights``.
-    skeleton : Skeleton or DirectionCosines, default=None
-        The Skeleton of joint positions, or the DirectionCosines of postures. By default that of the
-        step of the pipeline which takes joint positions; without any, features are averaged as
-        numbers.
-    lengths_of : label or int, default=None
-        The performance, by index or label in X, whose lengths of limbs the blend has. By default
-        they are averaged.
+    skeleton : Skeleton, default=None
+        That of joint positions. By default that of the step of the pipeline which takes joint
+        positions; without any, features are averaged as numbers.
     **params : dict
         Metadata of the matching, such as ``keyframes``.
 
@@ -111,25 +104,11 @@ def blend_performances(
     the largest weight, the first of equal ones, is used. Extrapolated lengths and paces are at
     least half the smallest one of the performances.
 
-    Links that are neither limbs nor bones, such as from the pelvis to the middle of the hips or to
-    a marker, are averaged as vectors along the axes of the body, unless they keep their length in
-    every performance. Joints between two landmarks, such as of the spine, follow the bones from the
-    pelvis. Bones that close a ring with limbs, such as the last one to the head, collar bones, and
-    those from the pelvis to the hips, may change their length. Bodies in a picture (``n_dims=2``)
-    are not rotated.
-
-    The heading is interpolated where the hips are within 17 degrees of the vertical. A performance
-    that lies on its side from the first to the last frame has no heading, and is blended along the
-    axes of the recording.
-
     A foot stands while its ankle, heel or toe is slow, against the fastest joint of the body, and
     as low as the other foot. It then moves along the floor, and is as high, as on average in the
     performances with positive weights. So negative weights exaggerate steps, but not how feet slip.
-    Feet that slip in a recording, or go with a treadmill, do so in its blends. Where a foot stands
-    in one performance and steps in another of positive weight, it slides. The correction changes
-    evenly while feet swing, and moves a foot by less than a quarter of the leg. No sole sinks below
-    the mean of its lowest heights. Bodies in a picture, and legs without hip, knee and ankle, are
-    left as they are.
+    Feet that slip in a recording, or go with a treadmill, do so in its blends. Bodies in a picture
+    (``n_dims=2``), and legs without hip, knee and ankle, are left as they are.
 
     Examples
     --------
@@ -154,23 +133,21 @@ def blend_performances(
     sequences, arrays, is_rows = _read(X, may_be_rows)
     labels, levels = labels_of(sequences)
     rates = compare_facts(arrays.facts, arrays.called).get("frame_rate", ())
-    _check(sequences, arrays, skeleton)
+    if skeleton is not None:
+        # Refuses sequences that are not positions of the skeleton.
+        JointPositions(skeleton).fit(sequences)
     match = estimator
     if not isinstance(estimator, Match):
         match = route_to_synchronizer(estimator, X, params, "blend_performances").match()
     elif params:
         raise TypeError(f"A Match takes no {sorted(params)}.")
     warps = match.frames(list(map(len, arrays)))
-    n_frames, owner = warps.shape[1], None
+    n_frames = warps.shape[1]
     weights = _weights(weights, labels, n_frames, "weights")
     timing = weights if timing is None else _weights(timing, labels, n_frames, "timing")
-    if lengths_of is not None:
-        if not isinstance(skeleton, Skeleton):
-            raise ValueError("lengths_of is for joint positions, which have limbs: give skeleton.")
-        owner = _index(lengths_of, labels, "lengths_of")
     frames, at = _blend_pace(warps, timing)
     weights = np.stack([np.interp(at, np.arange(n_frames), w) for w in weights.T])
-    out = _blend(arrays, frames, weights, skeleton, owner).astype(arrays[0].dtype, copy=False)
+    out = _blend(arrays, frames, weights, skeleton).astype(arrays[0].dtype, copy=False)
     return out[:, 0] if is_rows else _like(sequences, out, levels[-1], rates)
 
 
@@ -187,35 +164,19 @@ def _read(X, may_be_rows):
 
 
 def _skeleton_of(estimator, skeleton):
-    """The skeleton of joint positions, the cosines of postures, or None for numbers."""
+    """The skeleton of joint positions, or None for numbers."""
     if skeleton is not None:
-        if isinstance(skeleton, (Skeleton, DirectionCosines)):
+        if isinstance(skeleton, Skeleton):
             return skeleton
         raise ValueError(
-            "skeleton must be the Skeleton of joint positions, or the DirectionCosines that made "
-            f"the postures; got {type(skeleton).__name__}."
+            "skeleton must be the Skeleton of joint positions, such as Skeleton.kinect(); got "
+            f"{type(skeleton).__name__}."
         )
     if isinstance(estimator, Match):
         return None
     steps = [each for step in flat_steps(estimator) for each in union_transformers(step)]
     skeletons = [step.skeleton for step in steps if isinstance(step, PositionsTransformer)]
     return skeletons[0] if skeletons else None
-
-
-def _check(sequences, arrays, skeleton):
-    """Refuse sequences that are not positions or postures of the skeleton."""
-    if isinstance(skeleton, Skeleton):
-        JointPositions(skeleton).fit(sequences)
-    elif skeleton is not None:
-        names = skeleton.get_feature_names_out()
-        if arrays[0].shape[1] != len(names):
-            raise ValueError(
-                f"Performance 0 has {counted(arrays[0].shape[1], 'feature')} a frame, but postures "
-                f"of these DirectionCosines have {len(names)}. For joint positions give the "
-                "Skeleton."
-            )
-        for i, x in enumerate(sequences):
-            check_names(x, names, f"Performance {i}")
 
 
 def _weights(given, labels, n_frames, what) -> np.ndarray:
@@ -299,20 +260,14 @@ def _blend_pace(warps, timing):
     return np.where(np.abs(frames - exact) < ROUNDING * warps.max(), exact, frames), at
 
 
-def _blend(arrays, frames, weights, skeleton, owner):
+def _blend(arrays, frames, weights, skeleton):
     """The blend of performances with weights other than 0, (n_frames, n_features)."""
     used = weights.any(axis=1)
-    if owner is not None:
-        used[owner] = True
-        owner = int(used[:owner].sum())
     chosen = [x.astype(np.float64) for x, u in zip(arrays, used, strict=True) if u]
     frames, weights = frames[used], weights[used]
     if skeleton is None:
         return blend_numbers(chosen, frames, weights)
-    if isinstance(skeleton, DirectionCosines):
-        body = skeleton.skeleton
-        return blend_postures(chosen, frames, weights, int(body.has_height), body.n_dims)
-    return blend_bodies(chosen, frames, weights, skeleton, owner)
+    return blend_bodies(chosen, frames, weights, skeleton)
 
 
 def _like(sequences, array, name, rates):

@@ -134,27 +134,6 @@ def test_weight_of_one_gives_incomplete_bodies_back(landmarks):
     assert np.isfinite(blend_performances(even(*X), X, [0.5, 0.5], skeleton=skeleton)).all()
 
 
-@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
-def test_postures_are_blended_as_bodies(bending, pipe, reference):
-    X = bending.data[:12]
-    cosines = DirectionCosines(bending.skeleton, reference).fit(X)
-    postures, match = cosines.transform(X), Match.from_estimator(pipe, X)
-    found = blend_performances(match, postures, {3: 1}, skeleton=cosines)
-    np.testing.assert_allclose(found, postures[3], atol=1e-12)
-    # In between they are those of the blended bodies, except the height, and legs that stand.
-    weights = {3: 0.3, 7: 0.7}
-    found = blend_performances(match, postures, weights, skeleton=cosines)
-    if reference == "heading":
-        body = cosines.transform(blend_performances(pipe, X, weights))
-        names = cosines.get_feature_names_out()
-        legs = np.array([name.rpartition("_")[0].endswith(("thigh", "leg")) for name in names])
-        legs[0] = True
-        np.testing.assert_allclose(found[:, ~legs], body[:, ~legs], atol=1e-9)
-        np.testing.assert_allclose(found[:, 1:], body[:, 1:], atol=0.05)
-    norms = np.linalg.norm(found[:, 1:].reshape(len(found), -1, 3), axis=2)
-    np.testing.assert_allclose(norms, 1, atol=1e-12)
-
-
 # -- limbs ------------------------------------------------------------------------------------
 
 
@@ -205,18 +184,6 @@ def test_links_that_keep_their_length_do_in_the_blend():
     hips = [found[:, PAPER.index_of(f"{side}_hip")] for side in ("left", "right")]
     apart = found[:, PAPER.index_of("pelvis")] - np.mean(hips, axis=0)
     np.testing.assert_allclose(np.linalg.norm(apart, axis=1), 0.1)
-
-
-def test_lengths_of_chooses_the_limbs_of_one_performance():
-    X = [walker(60), walker(80, size=1.3, seed=1)]
-    found = blend_performances(even(*X), X, [1, 0], skeleton=PAPER, lengths_of=1)
-    expected = np.repeat(lengths_of(X[1], PAPER)[:1], 60, axis=0)
-    np.testing.assert_allclose(lengths_of(found, PAPER), expected, atol=1e-9)
-    # The directions are those of the first, and the path grows with the body.
-    cosines = DirectionCosines(PAPER).fit(X)
-    np.testing.assert_allclose(*(cosines.transform(x)[:, 1:] for x in (found, X[0])), atol=1e-9)
-    way, own = (x[-1, 2] - x[0, 2] for x in (found, X[0]))
-    assert way / own == pytest.approx(1.3)
 
 
 def test_recorded_limbs_do_not_shrink(bends):
@@ -385,7 +352,7 @@ def test_tables_keep_labels_and_names(bending):
     keys = ["ann", "bob", "cat"]
     df = pd.concat(tables, keys=keys, names=["subject", "time"])
     for X in (df, to_sequences(df)):
-        found = blend_performances(pipe, X, {"ann": 0.5, "cat": 0.5}, lengths_of="bob")
+        found = blend_performances(pipe, X, {"ann": 0.5, "cat": 0.5})
         assert list(found.columns) == bending.skeleton.column_names
         assert found.index.name == "time"
         assert Skeleton.from_frame(found) == Skeleton.from_frame(tables[0])
@@ -437,7 +404,6 @@ def test_tables_get_even_times(times, expected):
         ({"weights": {7: 1}}, "no performance 7"),
         ({"weights": "one"}, "not a numeric array"),
         ({"timing": [1, 1, 1]}, "timing must have the sum 1"),
-        ({"lengths_of": "bob"}, "no performance 'bob'"),
         ({"skeleton": "kinect"}, "must be the Skeleton"),
         ({"skeleton": Skeleton.kinect()}, "joints need 60"),
         ({"X": np.zeros((5, 45))}, "Wrap one performance"),
@@ -460,17 +426,6 @@ def test_refuses_gaps_and_sequences_that_do_not_suit_the_match(bending, pipe):
         blend_performances(match, X[:1], [1], skeleton=bending.skeleton)
     with pytest.raises(TypeError, match="takes no"):
         blend_performances(match, X[:1], [1], keyframes=[])
-    with pytest.raises(ValueError, match="lengths_of is for joint positions"):
-        blend_performances(match, bending.data[:2], [1, 0], lengths_of=0)
-
-
-def test_refuses_postures_in_another_order(bending):
-    cosines = DirectionCosines(bending.skeleton).fit(bending.data[:2])
-    names = cosines.get_feature_names_out()
-    X = [pd.DataFrame(x, columns=names) for x in cosines.transform(bending.data[:2])]
-    X[1] = X[1][names[::-1]]
-    with pytest.raises(ValueError, match="Performance 1 has the columns"):
-        blend_performances(even(*X), X, [1, 0], skeleton=cosines)
 
 
 def test_keyframes_are_passed_to_the_match(bending):
