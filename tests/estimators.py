@@ -67,7 +67,6 @@ INSTANCES = {
     "Synchronizer": [ShiftSynchronizer()],
     "TimingChannel": [
         TimingChannel(LinearSynchronizer()),
-        TimingChannel(QUICK, "log_rate"),
         TimingChannel(QUICK, errors=True),
     ],
     "ActionModel": [ActionModel()],

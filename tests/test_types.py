@@ -161,7 +161,7 @@ DenseSynchronizer(keyframe_std=2.5).fit(X, keyframes=[[5.5], None, np.array([np.
 DenseSynchronizer().fit_transform(X, keyframes=pd.DataFrame({"a": [0.5, 0.6, 0.7]}), frame_rate=10)
 DenseSynchronizer().fit(X, keyframes=np.array([[5.0], [6], [7]])).match(X, [[5], None, [7]])
 keyframes_from_events(X, pd.DataFrame({"trial": [0], "event": "a", "frame": 5}), ["a"]).loc[0, "a"]
-TimingChannel(LinearSynchronizer(), "log_rate").fit_transform(X).shape
+TimingChannel(LinearSynchronizer(), "frames").fit_transform(X).shape
 ActionModel(coverage=0.9).fit(X, groups=["ann", "ann", "bob"]).envelope()[0].shape
 ActionModel().fit(X, groups=pd.Series([0, 1, 2])).sample(2, random_state=0).tolist()
 ActionClassifier(costs=["velocity"], n_jobs=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from numbers import Real
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from sklearn import get_config
@@ -30,8 +30,8 @@ from .parts import PartSynchronizer
 
 __all__ = ["TimingChannel"]
 
-# The feature of the standard errors of the offset.
-_ERROR = "offset_error"
+# The appended features: the offset, and its standard errors.
+_OFFSET, _ERROR = "offset", "offset_error"
 # Synchronizers whose matches tell how sure they are.
 _TELLING = (DenseSynchronizer, PartSynchronizer)
 
@@ -42,27 +42,23 @@ class TimingChannel(
     """Synchronised performances, with their timing as an additional feature.
 
     Synchronisation removes differences in timing from the curves. Here they are appended to the
-    curves, so that later steps, such as principal components, a test along the clock, or a
-    classifier, use both shape and timing.
+    curves, as how much later than the pattern a performance is (`Match.offsets_in`). So later
+    steps, such as principal components, a test along the clock, or a classifier, use both shape and
+    timing.
 
     Parameters
     ----------
     synchronizer : Synchronizer
         Such as ``DenseSynchronizer()``; a clone of it is fitted.
-    channel : {"offset", "log_rate"}, default="offset"
-        The appended feature: how much later than the pattern a performance is
-        (``Match.offsets_in(unit)``), or the log rate (``np.log(Match.rates)``), which has no unit
-        and is positive where a performance is slower.
     unit : {"percent", "frames", "seconds"}, default="percent"
         Unit of the offset: per cent of the clock, frames of the pattern, or seconds of each
         performance.
     frame_rate : float, default=None
         Frames per second of the performances, for seconds only.
     errors : bool, default=False
-        Whether to append, after the channel, the standard error of the offset in its unit: half of
-        the interval that `Match.interval` gives for a coverage of 68.27 %. For
-        ``channel="offset"`` of a `DenseSynchronizer` or `PartSynchronizer` only, whose matches tell
-        how sure they are.
+        Whether to append, after the offset, its standard error in its unit: half of the interval
+        that `Match.interval` gives for a coverage of 68.27 %. For a `DenseSynchronizer` or
+        `PartSynchronizer` only, whose matches tell how sure they are.
 
     Attributes
     ----------
@@ -82,7 +78,7 @@ class TimingChannel(
 
     Notes
     -----
-    The unit of the channel differs from those of the features. Scale them before they are combined,
+    The unit of the offset differs from those of the features. Scale them before they are combined,
     as in principal components.
 
     Errors are 0 at both ends and at exact key-frames, where a warp is pinned, and nearly 0 for the
@@ -123,7 +119,6 @@ class TimingChannel(
 
     _parameter_constraints: dict = {
         "synchronizer": [Synchronizer],
-        "channel": [StrOptions({"offset", "log_rate"})],
         "unit": [StrOptions(set(UNITS))],
         "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
         "errors": ["boolean"],
@@ -132,13 +127,11 @@ class TimingChannel(
     def __init__(
         self,
         synchronizer: Synchronizer,
-        channel: Literal["offset", "log_rate"] = "offset",
         unit: Unit = "percent",
         frame_rate: float | None = None,
         errors: bool = False,
     ) -> None:
         self.synchronizer = synchronizer
-        self.channel = channel
         self.unit = unit
         self.frame_rate = frame_rate
         self.errors = errors
@@ -164,17 +157,12 @@ class TimingChannel(
         Raises
         ------
         ValueError
-            If the frame rate for seconds is missing, errors are asked of a log rate or of a
-            synchronizer whose matches do not tell them, or a feature has the name of the channel or
-            of the errors; and as from the ``fit`` of the synchronizer.
+            If the frame rate for seconds is missing, errors are asked of a synchronizer whose
+            matches do not tell them, or a feature has the name of the offset or of the errors; and
+            as from the ``fit`` of the synchronizer.
         """
-        if self.channel == "offset" and self.unit == "seconds" and self.frame_rate is None:
+        if self.unit == "seconds" and self.frame_rate is None:
             raise ValueError("unit='seconds' needs frame_rate, frames per second of X.")
-        if self.errors and self.channel != "offset":
-            raise ValueError(
-                f"errors=True needs channel='offset': the error of {self.channel!r} is not known. "
-                "Set channel='offset' or errors=False."
-            )
         if self.errors and not isinstance(self.synchronizer, _TELLING):
             raise ValueError(
                 f"errors=True needs {' or '.join(kind.__name__ for kind in _TELLING)}, whose "
@@ -184,9 +172,9 @@ class TimingChannel(
         sync, given = clone(self.synchronizer), self._route("fit", params)
         with self._progress(fits=True) as progress, progress.fitting(sync, "synchronizing"):
             sync.fit(X, y, **given)
-        for name in self._own_names():
+        for name in self._names_of_timing():
             if name in getattr(sync, "feature_names_in_", ()):
-                what = "channel" if name == self.channel else "errors"
+                what = "offset" if name == _OFFSET else "errors"
                 raise ValueError(f"A feature of X has the name of the {what}, {name!r}: rename it.")
         self.synchronizer_ = sync
         for name in ("n_frames_", "_fitted_on_rows"):
@@ -229,7 +217,7 @@ class TimingChannel(
         return self.fit(X, y, **to_fit).transform(X, **{name: params[name] for name in warps})
 
     def transform(self, X: PerformancesLike, **params: Any) -> Transformed:
-        """Warp performances onto the clock of the pattern, and append the channel.
+        """Warp performances onto the clock of the pattern, and append the offset.
 
         Parameters
         ----------
@@ -241,8 +229,8 @@ class TimingChannel(
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features + 1)
-            The channel is the last feature; with errors they follow as one more. For 2-D input
-            ``(n_sequences, 2 P)``: each row is a curve, then its channel, then its errors. A
+            The offset is the last feature; with errors they follow as one more. For 2-D input
+            ``(n_sequences, 2 P)``: each row is a curve, then its offset, then its errors. A
             ``(performance, frame)`` frame under ``set_output(transform="pandas")``.
         """
         check_is_fitted(self)
@@ -251,18 +239,15 @@ class TimingChannel(
         match = sync.match(performances, **params)
         check_match(match, len(performances), self.n_frames_, type(sync).__name__)
         curves = match.warp(performances)
-        if self.channel == "log_rate":
-            own = [np.log(match.rates)]
-        else:
-            clock = self.unit, [len(x) for x in performances], self.frame_rate
-            own = [match.offsets_in(*clock)]
-            if self.errors:
-                lower, upper = match.interval(STANDARD, *clock)
-                own.append((upper - lower) / 2)
-        own = [channel.astype(curves.dtype) for channel in own]
+        lengths = [len(x) for x in performances]
+        timing = [match.offsets_in(self.unit, lengths, self.frame_rate)]
+        if self.errors:
+            lower, upper = match.interval(STANDARD, self.unit, lengths, self.frame_rate)
+            timing.append((upper - lower) / 2)
+        timing = [feature.astype(curves.dtype) for feature in timing]
         if performances.kind == "rows":
-            return np.concatenate([curves[:, :, 0], *own], axis=1)
-        out = np.concatenate([curves, np.stack(own, axis=2)], axis=2)
+            return np.concatenate([curves[:, :, 0], *timing], axis=1)
+        out = np.concatenate([curves, np.stack(timing, axis=2)], axis=2)
         return restore(self, performances, out, frames=range(self.n_frames_))
 
     def match(self, X: PerformancesLike, **params: Any) -> Match:
@@ -284,9 +269,9 @@ class TimingChannel(
         return self.synchronizer_.match(X, **params)
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
-        """Names of the outputs: those of the synchronizer, then those of the channel.
+        """Names of the outputs: those of the synchronizer, then those of the offset.
 
-        These are ``"offset"`` or ``"log_rate"``, and with errors ``"offset_error"``.
+        These are ``"offset"``, and with errors ``"offset_error"``.
 
         Parameters
         ----------
@@ -296,15 +281,15 @@ class TimingChannel(
         Returns
         -------
         ndarray of str
-            For 2-D input a name for each frame of the curve, then for each of the channel, and of
+            For 2-D input a name for each frame of the curve, then for each of the offset, and of
             the errors.
         """
         check_is_fitted(self)
         names = self.synchronizer_.get_feature_names_out(input_features)
-        own = self._own_names()
+        of_timing = self._names_of_timing()
         if self._fitted_on_rows:
-            own = [f"{name}{p}" for name in own for p in range(self.n_frames_)]
-        return np.concatenate([names, np.asarray(own, dtype=object)])
+            of_timing = [f"{name}{p}" for name in of_timing for p in range(self.n_frames_)]
+        return np.concatenate([names, np.asarray(of_timing, dtype=object)])
 
     def get_metadata_routing(self):
         """Metadata routing of this object.
@@ -329,9 +314,9 @@ class TimingChannel(
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
 
-    def _own_names(self):
+    def _names_of_timing(self):
         """The names of the appended features."""
-        return [self.channel, _ERROR] if self.errors else [self.channel]
+        return [_OFFSET, _ERROR] if self.errors else [_OFFSET]
 
     def _route(self, method, params):
         """The metadata that a method of the synchronizer is given."""
