@@ -14,7 +14,7 @@ from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..inputs.wording import counted
 from ..matching.costs import COSTS
 from ..matching.warps import normalise
-from ..utils.parallel import Progress, SharedArgument, run
+from ..utils.parallel import Progress, run
 from ..utils.parameters import validated_function
 from .pairwise import PairwiseDistance, blocks_of_pairs
 
@@ -199,7 +199,7 @@ def _directed(comparison, bases, moving, *, n_jobs, progress, name):
     stage = f"comparing {len(bases)} with {counted(len(moving), 'performance')}{name}"
     step = progress.stage(stage, len(portions))
     out = np.empty((len(bases), len(moving)))
-    common = (SharedArgument((comparison, bases, moving)),)
+    common = ((comparison, bases, moving),)
     for blocks in run(_blocks, portions, common=common, n_jobs=n_jobs, step=step):
         for (i, j), distances in blocks:
             out[i, j] = distances

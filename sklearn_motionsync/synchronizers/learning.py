@@ -31,7 +31,7 @@ from ..matching.refinement import SAME_SOURCE, Refiner, unexplained_variance
 from ..matching.sharpening import Sharpener
 from ..matching.trellis import TILE_BASES
 from ..matching.warps import even_slices, sample
-from ..utils.parallel import SharedArgument, one_blas_thread, run
+from ..utils.parallel import one_blas_thread, run
 from .training import known_whole, warn_of_one_feature
 
 __all__ = [
@@ -470,7 +470,7 @@ def sums_in_portions(matcher, positions, references, compared, *, n_jobs, progre
         portions = [(matcher, compared[rows], compared) for rows in slices]
         blocks = run(_sums, portions, n_jobs=n_jobs, prefer="threads", step=step)
     else:
-        common = SharedArgument(matcher), SharedArgument(positions), SharedArgument(compared)
+        common = matcher, positions, compared
         portions = [(rows,) for rows in slices]
         blocks = run(
             _sums_of_rows, portions, common=common, n_jobs=n_jobs, prefer="threads", step=step
@@ -521,7 +521,7 @@ def warp_in_portions(warper, arrays, body_times=None, *, n_jobs, begin, name):
     distances, times = np.empty(len(arrays)), np.empty((len(arrays), len(warper.pattern)))
     with begin(fits=False) as progress:
         step = progress.stage(name, len(slices))
-        results = run(_warps, portions, common=(SharedArgument(warper),), n_jobs=n_jobs, step=step)
+        results = run(_warps, portions, common=(warper,), n_jobs=n_jobs, step=step)
         for rows, (lengths, warps) in zip(slices, results, strict=True):
             distances[rows], times[rows] = lengths, warps
     return distances, times

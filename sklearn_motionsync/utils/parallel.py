@@ -8,11 +8,8 @@ portions are shared out.
 import contextlib
 import functools
 import os
-import sys
 import threading
 import time
-import uuid
-from collections import deque
 from typing import Any
 
 from joblib import Parallel, delayed, effective_n_jobs
@@ -20,7 +17,7 @@ from joblib.parallel import get_active_backend
 from sklearn import config_context, get_config
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["LongWorkMixin", "Progress", "SharedArgument", "on_cluster", "one_blas_thread", "run"]
+__all__ = ["LongWorkMixin", "Progress", "one_blas_thread", "run"]
 
 try:
     from sklearn.callback import CallbackSupportMixin
@@ -45,8 +42,8 @@ def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
         Something that can be pickled, if there are several jobs.
     portions : list of tuples
         The arguments of each portion. Large arrays reach other processes as read-only memory maps.
-    common : tuple of SharedArgument, default=()
-        First arguments, which all portions share.
+    common : tuple, default=()
+        First arguments, which all portions share; each worker of a Dask cluster is sent them once.
     n_jobs : int, default=None
         As everywhere in scikit-learn: None means 1, unless ``joblib.parallel_config`` says
         otherwise.
@@ -71,30 +68,29 @@ def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
 
 
 def _results(function, portions, common, n_jobs, prefer, running):
-    values = [argument.value for argument in common]
     if len(portions) < 2 or effective_n_jobs(n_jobs) == 1:
-        return (_call_portion(function, *values, *portion) for portion in portions)
+        return (_call_portion(function, *common, *portion) for portion in portions)
     backend, _ = get_active_backend(prefer=prefer)
-    call = running.call
-    if not getattr(backend, "supports_sharedmem", False):
-        call, values = _call_portion, [argument.send_to(backend) for argument in common]
+    call = running.call if getattr(backend, "supports_sharedmem", False) else _call_portion
+    client = getattr(backend, "client", None)
+    if common and hasattr(client, "scatter"):
+        # Dask would forget a value whose key is made of its content if two tasks send it.
+        common = client.scatter(list(common), broadcast=True, hash=False)
     # scikit-learn's own Parallel has threads that restore each other's warning filters. Other
     # threads have a configuration of their own, so each call is given that of this thread.
     config = get_config()
-    calls = ((config, call, function, *values, *portion) for portion in portions)
-    if _ray_of(backend) is not None:
-        return _ray_results(backend, _call_configured, calls, effective_n_jobs(n_jobs))
-    tasks = (delayed(_call_configured)(*call) for call in calls)
+    tasks = (
+        delayed(_call_configured)(config, call, function, *common, *portion) for portion in portions
+    )
     try:
         parallel = Parallel(n_jobs=n_jobs, prefer=prefer, return_as="generator")
     except ValueError:
-        # Some backends return all results at once only.
+        # Some backends, such as Ray's, return all results at once only.
         return (result for result in Parallel(n_jobs=n_jobs, prefer=prefer)(tasks))
     return parallel(tasks)
 
 
 def _call_configured(config, call, *arguments):
-    arguments = [a.load() if isinstance(a, ScatteredReference) else a for a in arguments]
     with config_context(**config):
         return call(*arguments)
 
@@ -133,35 +129,6 @@ class _RunningCalls:
             self._closed = True
             own = {threading.get_ident()}
             self._changed.wait_for(lambda: self._threads <= own)
-
-
-class SharedArgument:
-    """An argument that all portions share; a cluster is sent it once, in however many runs.
-
-    Parameters
-    ----------
-    value : object
-    """
-
-    def __init__(self, value):
-        self.value = value
-        self._cluster = self._sent = None
-
-    def send_to(self, backend):
-        """The argument of a call under a backend: on a cluster a reference to the sent value."""
-        client, ray = _client_of(backend), _ray_of(backend)
-        if client is None and ray is None:
-            return self.value
-        cluster = client if ray is None else ray
-        if self._cluster is not cluster:
-            self._sent = ray.put(self.value) if ray else ScatteredValue(client, self.value)
-            self._cluster = cluster
-        return self._sent if ray else self._sent.reference()
-
-
-def on_cluster():
-    """Whether portions go to a Dask cluster, whose workers are sent all they need."""
-    return _client_of(get_active_backend()[0]) is not None
 
 
 # -- linear algebra on one thread --------------------------------------------------------
@@ -318,139 +285,3 @@ class Progress:
         """End the tasks begun within this depth, the last one first."""
         while len(self._tasks) > depth:
             self._tasks.pop().call_on_fit_task_end(estimator=self._estimator)
-
-
-# -- Ray ---------------------------------------------------------------------------------
-
-
-def _ray_of(backend):
-    """The module ``ray``, if it made this joblib backend; else None."""
-    makers = {each.__module__.partition(".")[0] for each in type(backend).__mro__}
-    return sys.modules["ray"] if "ray" in makers else None
-
-
-def _ray_results(backend, function, calls, n_jobs):
-    """Yield ``function(*call)`` for every call, in order, by at most n_jobs tasks of Ray at a time.
-
-    An argument of a call may be what `ray.put` gave. The backend's ``ray_remote_args`` are options
-    of the tasks.
-    """
-    ray = _ray_of(backend)
-    # A task frees its processors while it waits for others; an actor keeps them.
-    options = {"num_cpus": 0} if ray.get_runtime_context().get_actor_id() else {}
-    options.update(getattr(backend, "ray_remote_args", None) or {})
-    task = ray.remote(function).options(**options)
-    waiting, running = deque(), []
-    try:
-        for call in calls:
-            if len(running) == n_jobs:
-                _, running = ray.wait(running, num_returns=1)
-            waiting.append(task.remote(*call))
-            running.append(waiting[-1])
-            while waiting[0] not in running:
-                yield _ray_result(ray, waiting.popleft())
-        while waiting:
-            yield _ray_result(ray, waiting.popleft())
-    finally:
-        for reference in waiting:
-            ray.cancel(reference)
-
-
-def _ray_result(ray, reference):
-    try:
-        return ray.get(reference)
-    except ray.exceptions.RayTaskError as error:
-        # The exception of the function itself.
-        raise error.cause from error
-
-
-# -- Dask --------------------------------------------------------------------------------
-
-
-def _client_of(backend):
-    """The Dask client of a joblib backend; None without a cluster."""
-    client = getattr(backend, "client", None)
-    return client if hasattr(client, "scatter") else None
-
-
-class ScatteredValue:
-    """A value with a copy on every worker of a Dask cluster.
-
-    Parameters
-    ----------
-    client : distributed.Client
-    value : object
-    """
-
-    def __init__(self, client, value):
-        self._client = client
-        # Dask would forget a value whose key is made of its content if two tasks send it.
-        (self._first,) = client.scatter([value], hash=False)
-        self._reference = ScatteredReference(self._first.key, uuid.uuid4().hex)
-        self._copies = {}
-
-    def reference(self):
-        """The argument of tasks, once all workers have copies, new workers too."""
-        workers = self._client.nthreads()
-        for worker in set(workers) - set(self._copies):
-            where = {"key": self._reference.key_of(worker), "workers": [worker]}
-            self._copies[worker] = self._client.submit(_identity, self._first, **where)
-        self._wait()
-        return self._reference
-
-    def _wait(self):
-        """Wait for the copies, but for workers that have gone meanwhile."""
-        from distributed import wait
-
-        waiting = self._copies
-        while waiting:
-            try:
-                wait(list(waiting.values()), timeout=1)
-            except TimeoutError as late:
-                # Dask keeps it in a reference cycle: its frames would keep the value alive until
-                # garbage is collected.
-                late.__traceback__ = None
-            workers = self._client.nthreads()
-            waiting = {w: f for w, f in waiting.items() if w in workers and not f.done()}
-
-
-class ScatteredReference:
-    """A reference to a `ScatteredValue`, by which a worker finds its copy.
-
-    Parameters
-    ----------
-    first : str
-        Dask's key of the value that was sent.
-    prefix : str
-        Of the keys of the workers' copies.
-    """
-
-    def __init__(self, first, prefix):
-        self.first, self.prefix = first, prefix
-
-    def key_of(self, worker):
-        """Dask's key of the copy of the worker at this address."""
-        return f"copy-{self.prefix}-{worker}"
-
-    def load(self):
-        """The copy of this worker."""
-        from distributed import Future, get_client, get_worker
-
-        worker = get_worker()
-        try:
-            return worker.data[self.key_of(worker.address)]
-        except KeyError:
-            # The worker joined during the run; it keeps the last value that it fetched.
-            if self.first not in _fetched:
-                first = Future(self.first, get_client(), state="memory")
-                _fetched.clear()
-                _fetched[self.first] = first.result()
-            return _fetched[self.first]
-
-
-# The last value that a worker fetched itself, by its key.
-_fetched: dict[str, Any] = {}
-
-
-def _identity(value):
-    return value

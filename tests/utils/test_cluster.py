@@ -19,7 +19,6 @@ import pytest
 import sklearn_motionsync
 from dask import delayed
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.utils.parallel import ScatteredReference, ScatteredValue
 
 import stream_dask
 import stream_files
@@ -172,21 +171,6 @@ def test_large_portions_of_warping_are_sent_ahead_of_their_tasks(client):
     assert warped.tobytes() == sync.transform(many).tobytes()
 
 
-def test_new_worker_fetches_a_scattered_value_once(client):
-    value = np.random.default_rng(0).standard_normal(200_000)
-    scattered, largest = ScatteredValue(client, value), []
-    name = scattered.reference()
-    unknown = ScatteredReference(name.first, "before it joined")
-    for worker in client.nthreads():
-        task = {"workers": [worker], "pure": False}
-        largest += [client.submit(lambda n: n.load().max(), name, **task).result()]
-        before = received(client)
-        for _ in range(5):
-            largest += [client.submit(lambda n: n.load().max(), unknown, **task).result()]
-        assert (received(client) - before).sum() < 1.2 * value.nbytes
-    assert set(largest) == {value.max()}
-
-
 # -- streams of portions ------------------------------------------------------------------------
 
 
@@ -306,14 +290,14 @@ def test_unreadable_file_is_named_after_results_of_earlier_ones(client, files, e
 
 def test_killed_worker_changes_no_bit(client, fitted, portions_of_walks, expected):
     stream_dask.give(client, fitted)
-    pids = client.run(os.getpid)
+    pids, workers = client.run(os.getpid), set(client.nthreads())
     answers = stream_dask.stream(client, portions_of_walks)
     found = [next(answers)]
     os.kill(next(iter(pids.values())), getattr(signal, "SIGKILL", signal.SIGTERM))
     found += answers
     assert [answer.tobytes() for answer in found] == [each.tobytes() for each in expected]
     # The worker that replaces it has the model, too.
-    wait_until(lambda: set(client.run(os.getpid).values()) - set(pids.values()))
+    wait_until(lambda: set(client.nthreads()) - workers)
     client.wait_for_workers(N_WORKERS, timeout=60)
     for worker in client.nthreads():
         task = client.submit(

@@ -19,7 +19,7 @@ import threadpoolctl
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.trellis import Trellis
-from sklearn_motionsync.utils.parallel import Progress, SharedArgument, run
+from sklearn_motionsync.utils.parallel import Progress, run
 
 SETTINGS = {
     "paper": {"cost": "posture", "max_rate": 2, "consensus": 0},
@@ -126,8 +126,7 @@ def test_run_passes_sklearn_configuration():
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_run_passes_shared_arguments_first(n_jobs):
-    common = SharedArgument("a"), SharedArgument("b")
-    found = run("{}{}{}".format, [(1,), (2,)], common=common, n_jobs=n_jobs)
+    found = run("{}{}{}".format, [(1,), (2,)], common=("a", "b"), n_jobs=n_jobs)
     assert list(found) == ["ab1", "ab2"]
 
 
