@@ -1,13 +1,10 @@
 """Performances from archives of joint positions (``*_positions.npz``)."""
 
-import math
 import sys
-import warnings
 import zipfile
 from pathlib import Path as FilePath
 
 import numpy as np
-from numpy.lib import format as npy
 from sklearn.utils import Bunch
 
 from ..body.skeleton import Skeleton, find_cycle
@@ -178,46 +175,18 @@ def _quote(values):
     return text + (", ...]" if len(values) > 8 else "]")
 
 
-# -- the arrays of a NumPy archive, whose size is checked before they are unpacked ------
-
-# The methods of NumPy. With others a small part may unpack to very much.
-_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-
-
 def _read_arrays(path):
-    """The arrays of `_NEEDED` that the archive has, by name."""
+    """The arrays of `_NEEDED` that the archive has, by name; their size is checked before."""
     try:
         with zipfile.ZipFile(path) as archive:
-            members = {
-                member.filename.removesuffix(".npy"): member for member in archive.infolist()
-            }
-            members = {name: members[name] for name in _NEEDED if name in members}
-            if any(member.compress_type not in _METHODS for member in members.values()):
-                raise ValueError("it is compressed by another method than NumPy's")
-            n_bytes = sum(member.file_size for member in members.values())
-            check_result_size(path, path.stat().st_size, n_bytes, "the arrays")
-            return {name: _read_array(archive, name, m) for name, m in members.items()}
+            n_bytes = sum(member.file_size for member in archive.infolist())
+        check_result_size(path, path.stat().st_size, n_bytes, "the arrays")
+        with np.load(path) as archive:
+            arrays = {name: archive[name] for name in _NEEDED if name in archive}
     except Exception as error:  # of zipfile, zlib, tokenize, ast, struct: any byte may be wrong
         if isinstance(error, ValueError) and str(error).startswith(f"{path}: "):
             raise
         reason = " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
         raise ValueError(f"{path} cannot be read as a NumPy .npz archive: {reason}.") from error
-
-
-def _read_array(archive, name, member):
-    with archive.open(member) as stream:
-        read_header = _HEADERS[npy.read_magic(stream)]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # headers that Python 2 wrote are valid
-            shape, by_column, dtype = read_header(stream)
-        n_bytes = math.prod(shape) * dtype.itemsize
-        n_left = member.file_size - stream.tell()
-        if n_bytes != n_left:
-            raise ValueError(
-                f"{name} says {dtype} {shape}, {n_bytes} bytes, but there are {n_left} of them"
-            )
-        content = stream.read(n_bytes)
-    values = np.frombuffer(content, dtype).reshape(shape, order="F" if by_column else "C")
-    # A copy: in the machine's own byte order, and writeable.
-    return values.astype(dtype.newbyteorder("="))
+    # In the machine's own byte order.
+    return {name: x.astype(x.dtype.newbyteorder("="), copy=False) for name, x in arrays.items()}

@@ -1,11 +1,8 @@
 """The motion capture database of Carnegie Mellon University, clip by clip."""
 
-import hashlib
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from numbers import Integral, Real
 from pathlib import Path as FilePath
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from sklearn.utils import Bunch
@@ -35,7 +32,6 @@ The database was created with funding from NSF EIA-0196217."
     {
         "download_if_missing": ["boolean"],
         "url": [str],
-        "sha256": [Mapping, None],
         "n_retries": [Interval(Integral, 0, None, closed="left")],
         "delay": [Interval(Real, 0, 3600, closed="both")],
     }
@@ -47,7 +43,6 @@ def fetch_cmu(
     data_home: Path | None = None,
     download_if_missing: bool = True,
     url: str = "http://mocap.cs.cmu.edu/subjects",
-    sha256: Mapping[str, str] | None = None,
     n_retries: int = 3,
     delay: float = 1.0,
 ) -> Bunch:
@@ -66,9 +61,6 @@ def fetch_cmu(
         Whether to download missing files; if False they are an error.
     url : str, default="http://mocap.cs.cmu.edu/subjects"
         Address of the folders of the subjects.
-    sha256 : mapping of str to str, default=None
-        Checksums of files by name, such as ``{"02.asf": "..."}``. A file of another checksum is
-        downloaded again, and refused if it still has another. By default none is checked.
     n_retries : int, default=3
         Number of further attempts after the network failed.
     delay : float, default=1.0
@@ -101,10 +93,14 @@ def fetch_cmu(
     FileNotFoundError
         If the site has no such subject or trial.
     OSError
-        If a file is missing and cannot be downloaded, or has another checksum.
+        If a file is missing and cannot be downloaded.
     ValueError
-        If a parameter is out of its range, or a file cannot be read. A file that was just
-        downloaded and cannot be read is removed again.
+        If a parameter is out of its range, or a file cannot be read.
+
+    Warns
+    -----
+    UserWarning
+        If a download is tried again.
 
     See Also
     --------
@@ -125,18 +121,18 @@ def fetch_cmu(
         raise ValueError("trials must be one number or several, got none.")
     folder = FilePath(get_data_home(data_home)) / "cmu_mocap" / subject
     names = [f"{subject}.asf", *(f"{subject}_{take}.amc" for take in takes)]
-    checksums = sha256 or {}
-    new = []
-    for name in dict.fromkeys(names):
-        if _is_valid(folder / name, checksums.get(name)):
+    for name in names:
+        if (folder / name).is_file():
             continue
         address = f"{url.rstrip('/')}/{subject}/{name}"
         if not download_if_missing:
             raise OSError(_describe_missing(folder / name, address, "download_if_missing is False"))
-        _download(address, folder / name, checksums.get(name), n_retries, delay)
-        new.append(folder / name)
-    files = [folder / name for name in names]
-    data = _read(files[0], files[1:], new)
+        _download(address, folder / name, n_retries, delay)
+    asf, *files = (folder / name for name in names)
+    try:
+        data = [read_motion(file, asf=asf, frame_rate=_FRAME_RATE) for file in files]
+    except ValueError as error:
+        raise ValueError(f"{error} Delete that file to get it again.") from error
     joints = data[0].attrs["joints"]
     try:
         skeleton = Skeleton(joints, data[0].attrs["parents"])
@@ -150,7 +146,7 @@ def fetch_cmu(
         skeleton=skeleton,
         frame_rate=np.full(len(takes), _FRAME_RATE),
         units="m",
-        filenames=[str(file) for file in files[1:]],
+        filenames=[str(file) for file in files],
         DESCR=_DESCR,
     )
 
@@ -163,12 +159,6 @@ def _two_digits(number: int | str, name: str) -> str:
     return f"{int(text):02d}"
 
 
-def _is_valid(path, sha256):
-    if not path.is_file():
-        return False
-    return sha256 is None or hashlib.sha256(path.read_bytes()).hexdigest() == sha256.lower()
-
-
 def _describe_missing(path, address, reason):
     return (
         f"{path.name} is not in {path.parent} and could not be got from {address}: {reason}. "
@@ -176,49 +166,23 @@ def _describe_missing(path, address, reason):
     )
 
 
-def _download(address, path, sha256, n_retries, delay):
-    """Fetch one file. It gets its name only when it is complete and has the right checksum."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(prefix="download_", dir=path.parent) as folder:
-        fetched = _try(address, FilePath(folder) / path.name, path, n_retries, delay)
-        if not _is_valid(fetched, sha256):
-            checksum = hashlib.sha256(fetched.read_bytes()).hexdigest()
-            raise OSError(
-                f"{path.name} from {address} has the checksum {checksum}, not {sha256}; it was not "
-                "kept. Correct sha256=, or give another url=."
-            )
-        fetched.replace(path)
-
-
-def _try(address, fetched, path, n_retries, delay):
-    """Attempts are counted here: fetch_file repeats them also for files that do not exist."""
+def _download(address, path, n_retries, delay):
+    """Fetch one file, which gets its name when it is complete."""
     from http.client import HTTPException
     from urllib.error import HTTPError
 
     from sklearn.datasets import fetch_file
 
-    for n_left in range(n_retries, -1, -1):
-        try:
-            return fetch_file(address, fetched.parent, fetched.name, n_retries=0)
-        except (OSError, HTTPException) as error:
-            if isinstance(error, HTTPError):
-                error.close()
-                if error.code in (404, 410):
-                    raise FileNotFoundError(
-                        f"There is no {path.name} at {address} (HTTP {error.code}); that subject "
-                        "or trial does not exist there. Look for its number on the site, or give "
-                        "another url=."
-                    ) from error
-            if not n_left:
-                raise OSError(_describe_missing(path, address, error)) from error
-        time.sleep(delay)
-
-
-def _read(asf, files, new):
+    path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        return [read_motion(file, asf=asf, frame_rate=_FRAME_RATE) for file in files]
-    except ValueError as error:
-        for path in new:
-            path.unlink()
-        advice = "Downloaded files were removed." if new else "Delete that file to get it again."
-        raise ValueError(f"{error} {advice}") from error
+        fetch_file(address, path.parent, path.name, n_retries=n_retries, delay=delay)
+    except HTTPError as error:
+        error.close()
+        if error.code not in (404, 410):
+            raise OSError(_describe_missing(path, address, error)) from error
+        raise FileNotFoundError(
+            f"There is no {path.name} at {address} (HTTP {error.code}); that subject or trial does "
+            "not exist there. Look for its number on the site, or give another url=."
+        ) from error
+    except (OSError, HTTPException) as error:
+        raise OSError(_describe_missing(path, address, error)) from error

@@ -89,9 +89,7 @@ def make_gait(
 
     Flexion of hip, knee and ankle in the sagittal plane and the vertical force under the foot, from
     one heel strike to the next of the same foot. People differ in their movement, pace and
-    duration, and so do, less, the cycles of a person. In group B the knee is flexed further in
-    swing by ``amplitude``, and the foot pushes off later by ``timing``; the groups do not differ
-    otherwise.
+    duration, and so do, less, the cycles of a person.
 
     Parameters
     ----------
@@ -100,17 +98,14 @@ def make_gait(
     n_cycles : int, default=3
         Number of cycles of each person, up to 10000.
     amplitude : float, default=0.0
-        Degrees, from -40 to 40, by which the peak of knee flexion in swing is larger in group
-        B.
+        Degrees, from -40 to 40, by which the knee flexes further in swing in group B.
     timing : float, default=0.0
         Per cent of the cycle, from -12 to 12, by which toe-off is later in group B. Moments
         around it are shifted with it, the less the farther away; the heel strikes stay.
     takes : bool, default=False
-        Whether to return one long take of all cycles of each person, with its events, instead of
-        single cycles.
+        Whether to return one long take of all cycles of each person, instead of single cycles.
     n_frames : int, default=100
-        Mean number of frames of a cycle, from 20 to a million; cycles have about 0.8 to 1.2 times
-        as many.
+        Mean number of frames of a cycle, from 20 to a million.
     style : float, default=1.0
         Size of the differences in movement between people and between cycles, from 0 to 100. At 1
         angles have a standard deviation of 3 to 5 degrees between people.
@@ -120,7 +115,7 @@ def make_gait(
         within a person.
     noise : float, default=0.3
         Standard deviation of the noise of angles, in degrees, up to 1000; that of the force is a
-        hundredth of it, in body weights, while the foot is on the ground.
+        hundredth of it, in body weights.
     frame_rate : float, default=100.0
         Frames per second, from 0.001.
     random_state : int, RandomState instance or None, default=None
@@ -130,13 +125,11 @@ def make_gait(
     -------
     Bunch
         data : list of ndarray (n_frames_i, 4)
-            Cycles, person by person; or takes, one for each person. The force is exactly 0 while
-            the foot is in the air. A take begins before its first heel strike, and ends after its
-            last one.
+            Cycles, person by person; or takes, one for each person, from before their first heel
+            strike until after their last one. The force is 0 while the foot is in the air.
         times : list of ndarray (n_frames_i,)
-            The moment that each frame shows, from 0 to 1: frames with equal times show the same
-            moment, in both groups. In takes cycles are counted: the first heel strike is at 0, the
-            last at ``n_cycles``.
+            The moment that each frame shows, the same in both groups, from 0 to 1; in takes from
+            heel strike to heel strike, up to ``n_cycles``.
         keyframes : ndarray (n_performances, 5)
             Frame (with fraction) of five moments within each cycle; in takes those of all cycles,
             and the heel strikes: ``(n_people, 6 * n_cycles + 1)``.
@@ -149,23 +142,18 @@ def make_gait(
         cycle : ndarray of int (n_performances,)
             The number of the cycle of the person, from 1; not with takes.
         events : list of list of dict
-            With takes only: the events of each take by time, as of ``read_motion``: ``label``
-            ("Foot Strike" or "Foot Off"), ``context`` ("Right"), ``time`` in seconds and ``frame``,
-            from 0 and with fractions.
+            With takes only: the foot strikes and foot-offs of each, as of ``read_motion``.
         feature_names : list of str
             "hip_flexion", "knee_flexion", "ankle_dorsiflexion", "vertical_force".
         units : list of str
             Their units: degrees, and body weights.
         frame_rate : float
             Frames per second, as given.
-        group_names : list of str
-            "A" and "B", in the order of what follows.
         group_curves : ndarray (2, 101, 4)
-            The typical curves of each group at 101 moments, evenly spaced on the scale of
-            ``times``: their difference is the true difference in shape.
+            The typical curves of each group at 101 even moments of ``times``, without differences
+            in timing.
         group_times : ndarray (2, 101)
-            The share of the cycle that is over at these moments in each group: the difference is
-            the true difference in timing.
+            The share of the cycle that is over at these moments in each group.
 
     Raises
     ------
@@ -182,8 +170,6 @@ def make_gait(
     >>> bunch = make_gait(4, n_cycles=2, timing=3, random_state=0)
     >>> len(bunch.data), bunch.feature_names
     (8, ['hip_flexion', 'knee_flexion', 'ankle_dorsiflexion', 'vertical_force'])
-    >>> bunch.person.tolist(), "".join(bunch.group)
-    (['person0', 'person0', 'person1', 'person1', ...], 'AABBAABB')
     >>> later = 100 * (bunch.group_times[1] - bunch.group_times[0])
     >>> later[[0, 30, 62, 100]].round(1).tolist()  # in per cent of the cycle
     [0.0, 0.8, 3.0, 0.0]
@@ -201,18 +187,20 @@ def make_gait(
         recorded.append(record(generator, walk, n_frames, noise))
     gait = _describe_takes(recorded, frame_rate) if takes else _describe_cycles(recorded)
     people = np.arange(n_people).repeat(len(gait.data) // n_people)
-    moments = np.linspace(0, 1, _N_MOMENTS)
-    gait.update(
-        person=np.array([f"person{i}" for i in people]),
-        group=np.array([_GROUPS[i % 2] for i in people]),
-        feature_names=list(_CURVES),
-        units=list(_UNITS),
-        frame_rate=float(frame_rate),
-        group_names=list(_GROUPS),
-        group_curves=np.stack([_typical_curves(moments, a) for a in (0.0, amplitude)]),
-        group_times=np.stack([_shift_times(moments, t) for t in (0.0, timing)]),
-    )
+    gait.update(_describe_groups(people, amplitude, timing))
+    gait.update(feature_names=list(_CURVES), units=list(_UNITS), frame_rate=float(frame_rate))
     return gait
+
+
+def _describe_groups(people, amplitude, timing):
+    """The person and group of each performance, and the typical movement of each group."""
+    moments = np.linspace(0, 1, _N_MOMENTS)
+    return {
+        "person": np.array([f"person{i}" for i in people]),
+        "group": np.array([_GROUPS[i % 2] for i in people]),
+        "group_curves": np.stack([_typical_curves(moments, a) for a in (0.0, amplitude)]),
+        "group_times": np.stack([_shift_times(moments, t) for t in (0.0, timing)]),
+    }
 
 
 # -- the walk of a person: curves, cycle after cycle, and their pace --------------------
