@@ -19,7 +19,7 @@ from ..inputs.types import (
     ValuesLike,
 )
 from ..inputs.validation import SequenceLevelMixin, check_performances
-from ..io.keyframes import is_table_of_events, keyframes_from_events
+from ..io.events import is_table_of_events, keyframes_from_events
 from ..synchronizers.match import check_unit, rates_of
 from ..utils.parallel import Progress
 from .permutation import check_test, families

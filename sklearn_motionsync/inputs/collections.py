@@ -3,7 +3,7 @@
 A set of performances is a list of 2-D arrays ``(n_frames_i, n_features)``. A 3-D array, a 1-D
 object array, a list of DataFrames (of pandas or polars) and a DataFrame indexed by performance, in
 one level or more, and frame are the same thing; so are a table with a series in each cell, and a
-DataArray of xarray (`containers`). A 2-D array is read by rows: postures for the posture-level
+DataArray of xarray (`tables`). A 2-D array is read by rows: postures for the posture-level
 estimators, univariate sequences for the sequence-level ones.
 
 Any other sequence that gives performances by index, ``len(X)`` and ``X[i]``, such as one that opens
@@ -23,7 +23,6 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-from .containers import as_table, check_dimensions, is_nested, split_nested
 from .facts import facts_of
 from .numbers import (
     FLOATS,
@@ -38,7 +37,17 @@ from .numbers import (
     listed,
 )
 from .recorded import warn_of_rows
-from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
+from .tables import (
+    INDEX_NAMES,
+    as_pandas,
+    as_table,
+    check_dimensions,
+    is_nested,
+    labels_of,
+    name_performance,
+    split_nested,
+    split_table,
+)
 from .wording import counted, within
 
 __all__ = [

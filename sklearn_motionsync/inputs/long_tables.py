@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 import reprlib
 from collections.abc import Hashable, Sequence
-from numbers import Real
 
 import numpy as np
 import pandas as pd
 
 from .collections import NOT_ONE, as_collection, check_members
-from .containers import is_labelled_array, is_nested
 from .facts import TIMELESS, compare_facts
 from .numbers import refuse_non_numeric
 from .recorded import CLOCK, Recorded, frame_rate_of_rows, warn_of_rows
@@ -19,7 +16,7 @@ from .resampling import (
     even_grid,
     find_time_gaps,
     interpolate,
-    look_like_events,
+    is_rate,
     times_as_numbers,
 )
 from .tables import (
@@ -30,6 +27,8 @@ from .tables import (
     SPLIT,
     as_pandas,
     full_names,
+    is_labelled_array,
+    is_nested,
     labelled,
     labels_given,
     own_label,
@@ -41,6 +40,12 @@ from .types import Labels, PerformancesLike, Table
 from .wording import counted
 
 __all__ = ["to_frame", "to_sequences"]
+
+# What to do with times that are no frames.
+_EVENTS = (
+    "Rows that are events, such as spikes, become rates first: see the page 'Align neural trials' "
+    "(docs/howto/neuroscience.md)."
+)
 
 
 def to_sequences(
@@ -61,9 +66,9 @@ def to_sequences(
     df : DataFrame of pandas or polars, or DataArray of xarray
         One row a frame. Without ``by`` and ``time`` its index has two levels or more: the last is
         the frame, increasing within each performance, and those before it name the performance.
-        Times there that are not even are warned of. Such a table is made of one with a row a
-        performance and a series in each cell, and of an array whose dimensions are those of
-        performances, ``time`` and features.
+        Times there that are not even are warned of. A table with a row a performance and a series
+        in each cell, and an array with the dimensions of performances, ``time`` and features, are
+        made into such a table.
     by : str or list of str, default=None
         Columns or index levels that together tell performances apart; rows of one performance
         need not be neighbours. By default the levels of the index before the last; a table
@@ -75,8 +80,7 @@ def to_sequences(
     frame_rate : float, default=None
         Frames in a unit of ``time`` that performances shall have. By default each keeps its own.
         Without ``time`` they are frames a second, and each performance has a known frame rate: in
-        its ``attrs``, as from `io.read_motion`, or by an index in seconds. The index of the result
-        is then in seconds.
+        its ``attrs``, as from `io.read_motion`, or by an index in seconds, as the result has.
     max_gap_time : float, default=None
         Longest step of ``time``, in its unit, that is bridged by a straight line. By default
         steps above 1.9 times the median step are errors.
@@ -89,17 +93,15 @@ def to_sequences(
         ``attrs["performance"]`` is the label, a tuple if several levels name the performance,
         ``attrs["levels"]`` the names of the levels. With a ``time``, ``attrs["resampled"]`` is
         whether frames were interpolated, and ``attrs["clock"]`` the time of the first frame and the
-        step to the next. A table without ``by`` keeps the label that it has. Other ``attrs`` stay;
-        what `io.read_motion` puts there of times, frame rate and events is that of the frames
-        returned. The index of the table tells which frames of the recording its rows are, as after
-        ``df.iloc[10:]``; where it does not, as it holds text, events and frame rate are left out.
+        step to the next. A table without ``by`` keeps the label that it has. What `io.read_motion`
+        puts into ``attrs`` of times, frame rate and events is that of the frames returned.
 
     Raises
     ------
     ValueError
         If there is no such column or level, a key or a time is missing, a time of a performance
-        comes twice, there is a gap, or rows look like events, such as spikes, whose times are all
-        that is recorded; without ``time``, if the frames of a performance do not increase.
+        comes twice, or there is a gap; without ``time``, if the frames of a performance do not
+        increase.
 
     See Also
     --------
@@ -107,11 +109,10 @@ def to_sequences(
 
     Notes
     -----
-    Frames count as evenly spaced. A performance whose times are even, but for rounding to the
-    digits they are written with, is left as it is. Any other is *resampled*: every feature is
-    interpolated linearly on an even grid from its first to its last time, whose step is as near as
-    possible to the median of its steps, or at ``frame_rate`` from its first time on. A gap in a
-    feature (NaN) stays one.
+    A performance whose times are even, but for rounding, is left as it is. Any other is
+    *resampled*: every feature is interpolated linearly on an even grid from its first to its last
+    time, whose step is as near as possible to the median of its steps, or at ``frame_rate`` from
+    its first time on. A gap in a feature (NaN) stays one.
 
     Examples
     --------
@@ -132,31 +133,10 @@ def to_sequences(
                     0.125    5.5
                     0.250    8.0
     Name: knee, dtype: float64
-
-    A recording at another frame rate:
-
-    >>> x = pd.DataFrame({"knee": [0.0, 1, 2, 3, 4]})
-    >>> x.attrs["frame_rate"] = 100
-    >>> (slower,) = to_sequences(x, frame_rate=50)
-    >>> slower["knee"].tolist(), slower.attrs["frame_rate"]
-    ([0.0, 2.0, 4.0], 50.0)
     """
-    df = as_pandas(df)
-    if is_labelled_array(df):
-        df = to_frame([df] if df.ndim == 2 else df)
-    if not isinstance(df, pd.DataFrame):
-        raise ValueError(
-            f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Several "
-            f"tables make one: pd.concat(tables, names={list(INDEX_NAMES)}); arrays that are "
-            "performances already need no table."
-        )
-    if is_nested(df):
-        df = to_frame(df)
+    df = _as_table(df)
     for name, value in (("frame_rate", frame_rate), ("max_gap_time", max_gap_time)):
-        if value is None:
-            continue
-        is_number = isinstance(value, Real) and not isinstance(value, bool)
-        if not is_number or not 0 < value < np.inf:
+        if value is not None and not is_rate(value):
             raise ValueError(
                 f"{name} must be a number above 0, in units of time; got {reprlib.repr(value)}."
             )
@@ -169,57 +149,7 @@ def to_sequences(
         sequences = split_table(df)
         warn_of_rows(sequences, lambda i: f"Performance {sequences[i].attrs['performance']!r}")
         return sequences
-    if df.index.nlevels > 1:
-        df = df.rename_axis(index=full_names(df.index.names))
-    keys = _keys(df, by, time)
-    flat = _levels_as_columns(df, keys, [] if time is None else [time])
-    features = flat.drop(columns=[*keys, *([] if time is None else [time])])
-    refuse_non_numeric(features, "The table")
-    names = keys or [PERFORMANCE]
-    if len(keys) > 1:
-        index = pd.MultiIndex.from_frame(flat[keys])
-    else:
-        index = pd.Index(flat[keys[0]] if keys else np.zeros(len(flat), dtype=int))
-    labels, rows_by_label = rows_of_labels(index, names)
-    if keys and len(flat) == len(labels):
-        raise ValueError(
-            f"{keys} give {counted(len(flat), 'performance')} of one row each, and a performance "
-            "has 2 frames or more, one below the other. Name in by= the columns of the "
-            "performance only, and the time in time=: to_sequences(df, by=..., time=...)."
-        )
-    if not keys and own_label(df)[0] is not None:
-        label, names = own_label(df)
-        labels = [label]
-    _refuse_events(flat, keys, time, rows_by_label, max_gap_time)
-    recording = Recorded(df)
-    if time is None:
-        level = ROW if FRAME in names else None
-        sequences = []
-        for rows, label in zip(rows_by_label, labels, strict=True):
-            x = _rows(features, rows, pd.RangeIndex(len(rows), name=level))
-            attrs = recording.attrs_of(rows)
-            sequences.append(labelled(x, label, (*names, level or FRAME), attrs))
-        return sequences
-    clock = flat[time]
-    if isinstance(clock.dtype, np.dtype) and clock.dtype.kind in "fiu":
-        clock = clock.to_numpy(dtype=np.float64)
-    timed = [
-        _in_order(clock, rows, label, time)
-        for rows, label in zip(rows_by_label, labels, strict=True)
-    ]
-    _check_gaps([times for times, _ in timed], labels, max_gap_time)
-    sequences = []
-    for (times, rows), label in zip(timed, labels, strict=True):
-        grid = even_grid(times, frame_rate, f"Performance {label!r}")
-        x = _rows(features, rows, pd.Index(times, name=time))
-        if grid is not None:
-            columns = {k: interpolate(x.iloc[:, k], times, grid) for k in range(x.shape[1])}
-            index = pd.Index(grid, name=time)
-            x = pd.DataFrame(columns, index=index).set_axis(x.columns, axis=1)
-        attrs = recording.attrs_of(rows, times, grid) | {"resampled": grid is not None}
-        attrs[CLOCK] = _clock(times if grid is None else grid)
-        sequences.append(labelled(x, label, (*names, time), attrs))
-    return sequences
+    return _split_by_columns(df, by, time, frame_rate, max_gap_time)
 
 
 def to_frame(
@@ -308,6 +238,77 @@ def to_frame(
 # -- steps of to_sequences ------------------------------------------------------------------
 
 
+def _as_table(df):
+    """A table of pandas, one row a frame."""
+    df = as_pandas(df)
+    if is_labelled_array(df):
+        df = to_frame([df] if df.ndim == 2 else df)
+    if not isinstance(df, pd.DataFrame):
+        raise ValueError(
+            f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Several "
+            f"tables make one: pd.concat(tables, names={list(INDEX_NAMES)}); arrays that are "
+            "performances already need no table."
+        )
+    return to_frame(df) if is_nested(df) else df
+
+
+def _split_by_columns(df, by, time, frame_rate, max_gap_time):
+    """The performances of a table of which columns or levels name performance or time."""
+    if df.index.nlevels > 1:
+        df = df.rename_axis(index=full_names(df.index.names))
+    keys, times = _keys(df, by, time), [] if time is None else [time]
+    flat = _levels_as_columns(df, keys, times)
+    features = flat.drop(columns=[*keys, *times])
+    refuse_non_numeric(features, "The table")
+    names = keys or [PERFORMANCE]
+    if len(keys) > 1:
+        index = pd.MultiIndex.from_frame(flat[keys])
+    else:
+        index = pd.Index(flat[keys[0]] if keys else np.zeros(len(flat), dtype=int))
+    labels, rows_by_label = rows_of_labels(index, names)
+    if keys and len(flat) == len(labels):
+        raise ValueError(
+            f"{keys} give {counted(len(flat), 'performance')} of one row each, and a performance "
+            "has 2 frames or more, one below the other. Name in by= the columns of the "
+            "performance only, and the time in time=: to_sequences(df, by=..., time=...)."
+        )
+    if not keys and own_label(df)[0] is not None:
+        label, names = own_label(df)
+        labels = [label]
+    recording = Recorded(df)
+    if time is None:
+        level = ROW if FRAME in names else None
+        return [
+            labelled(
+                _rows(features, rows, pd.RangeIndex(len(rows), name=level)),
+                label,
+                (*names, level or FRAME),
+                recording.attrs_of(rows),
+            )
+            for rows, label in zip(rows_by_label, labels, strict=True)
+        ]
+    clock = flat[time]
+    if isinstance(clock.dtype, np.dtype) and clock.dtype.kind in "fiu":
+        clock = clock.to_numpy(dtype=np.float64)
+    timed = [
+        _in_order(clock, rows, label, time)
+        for rows, label in zip(rows_by_label, labels, strict=True)
+    ]
+    _check_gaps([times for times, _ in timed], labels, max_gap_time)
+    sequences = []
+    for (times, rows), label in zip(timed, labels, strict=True):
+        grid = even_grid(times, frame_rate, f"Performance {label!r}")
+        x = _rows(features, rows, pd.Index(times, name=time))
+        if grid is not None:
+            columns = {k: interpolate(x.iloc[:, k], times, grid) for k in range(x.shape[1])}
+            index = pd.Index(grid, name=time)
+            x = pd.DataFrame(columns, index=index).set_axis(x.columns, axis=1)
+        attrs = recording.attrs_of(rows, times, grid) | {"resampled": grid is not None}
+        attrs[CLOCK] = _clock(times if grid is None else grid)
+        sequences.append(labelled(x, label, (*names, time), attrs))
+    return sequences
+
+
 def _at_rate(x, frame_rate):
     """A performance of a known frame rate at another one."""
     rate = frame_rate_of_rows(x)
@@ -360,41 +361,6 @@ def _levels_as_columns(df, keys, times):
     return flat
 
 
-def _refuse_events(flat, keys, time, rows_by_label, max_gap_time):
-    """Refuse rows that are events, such as spikes: a time and whole numbers, but no signal.
-
-    Where ``time`` is None, it may be left among the features.
-    """
-    features = flat.drop(columns=[*keys, *([] if time is None else [time])])
-    ids = [name for name in features if pd.api.types.is_integer_dtype(features[name])]
-    not_whole = [name for name in features if name not in ids]
-    if time is None:
-        # A warp is a column of times that increase unevenly, too.
-        words = "time|spike" if features.shape[1] > 1 else "spike"
-        called = [name for name in features if re.search(words, str(name), re.IGNORECASE)]
-        if len(called) != 1 or set(not_whole) - set(called):
-            return
-        time, ids = called[0], [name for name in ids if name not in called]
-        in_order = flat.groupby([*keys, *ids], observed=True)[time].is_monotonic_increasing
-        if not in_order.all() or 2 * len(in_order) > len(flat):
-            return
-    elif not_whole or (ids and max_gap_time is not None):
-        return
-    if flat[time].dtype.kind not in "fiu":
-        return
-    clock = flat[time].to_numpy(dtype=np.float64)
-    if look_like_events([clock[rows] for rows in rows_by_label], with_signal=bool(ids)):
-        beside = f"whole numbers, {ids}," if ids else "labels"
-        raise ValueError(
-            f"Rows look like events, such as spikes: times in {time!r} are uneven or come twice, "
-            f"and beside them are only {beside} and no signal. Count the events of each "
-            "performance in bins of even time, with one column a source, such as a neuron, and "
-            "give these rates: see the page 'Align neural trials' (docs/howto/neuroscience.md). "
-            "If rows are frames, name the time in time=, all columns that tell performances apart "
-            "in by=, and bridge gaps with max_gap_time=."
-        )
-
-
 def _in_order(column, rows, label, name):
     """Times of a performance, increasing, and its rows in this order."""
     called = f"The time of performance {label!r}"
@@ -415,7 +381,7 @@ def _in_order(column, rows, label, name):
         raise ValueError(
             f"Times of performance {label!r} come twice, {len(twice)} of them, the first is "
             f"{twice[0]:.10g}. Name in by= all columns that tell performances apart, or drop the "
-            "doubles by df.drop_duplicates."
+            f"doubles by df.drop_duplicates. {_EVENTS}"
         )
     return times, rows[order]
 
@@ -433,7 +399,7 @@ def _check_gaps(timed, labels, max_gap_time):
             f"Performance {label!r} has a gap from {start:.10g} to {end:.10g}, where frames are "
             f"{step:.4g} apart, the longest of {len(gaps)} in all performances. Frames count as "
             "evenly spaced: bridge gaps by straight lines with max_gap_time="
-            f"{end - start:.7g}, or leave such performances out."
+            f"{end - start:.7g}, or leave such performances out. {_EVENTS}"
         )
 
 

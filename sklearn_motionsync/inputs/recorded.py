@@ -5,7 +5,6 @@ pandas drops, thins out or reorders rows. The index goes with the rows: it tells
 are.
 """
 
-import math
 import re
 import warnings
 from numbers import Real
@@ -13,7 +12,7 @@ from numbers import Real
 import numpy as np
 import pandas as pd
 
-from .resampling import is_even, rounded_rate, times_as_numbers
+from .resampling import is_even, is_rate, rounded_rate, times_as_numbers
 from .tables import FRAME, split_table
 
 __all__ = [
@@ -123,7 +122,7 @@ def frame_rate_of_rows(x):
     if not isinstance(x, pd.DataFrame):
         return None
     rate, frames = x.attrs.get("frame_rate"), recorded_frames(x)
-    if frames is None or not _is_rate(rate):
+    if frames is None or not is_rate(rate):
         return _rate_of_seconds(_frame_level(x))
     steps = np.abs(np.diff(frames))
     if len(steps) and (steps[0] == 0 or (steps != steps[0]).any()):
@@ -149,7 +148,7 @@ def start_of_rows(x):
         return float(times_as_numbers(_frame_level(x), "The index")[0])
     start, rate, frames = x.attrs.get("first_time"), x.attrs.get("frame_rate"), recorded_frames(x)
     start = float(start) if isinstance(start, Real) else 0.0
-    return start if frames is None or not _is_rate(rate) else start + float(frames[0] / rate)
+    return start if frames is None or not is_rate(rate) else start + float(frames[0] / rate)
 
 
 def names_seconds(name):
@@ -230,7 +229,7 @@ def _trouble_of_rows(x):
         )
     rate = x.attrs.get("frame_rate")
     # Whole numbers are numbers of frames; those of a recording at a frame rate tell its time.
-    timed = index.dtype.kind in "fmM" or _is_rate(rate)
+    timed = index.dtype.kind in "fmM" or is_rate(rate)
     index_rate = _rate_of_seconds(index)
     is_uneven = index_rate is None and (steps != steps[0]).any() and not is_even(times)
     if is_uneven and _look_split(steps):
@@ -249,7 +248,7 @@ def _trouble_of_rows(x):
             f"{np.median(steps):.4g}. Frames count as evenly spaced: "
             f"to_sequences(df, time={name!r}) makes them so."
         )
-    has_two_rates = index_rate is not None and _is_rate(rate) and recorded_frames(x) is None
+    has_two_rates = index_rate is not None and is_rate(rate) and recorded_frames(x) is None
     if has_two_rates and not is_thinned(index_rate, rate):
         return (
             f"its index has {index_rate:g} frames a second, and x.attrs['frame_rate'] is "
@@ -332,12 +331,12 @@ class Recorded:
         for key, still in (("first_frame", first == 0), ("rows", first == 0 and all_rows)):
             if still and key in self._attrs:
                 facts[key] = self._attrs[key]
-        if start is not None and (_is_rate(rate) or first == 0):
+        if start is not None and (is_rate(rate) or first == 0):
             facts["first_time"] = start + (first / rate if first else 0)
         if seconds is not None and frames.max() < len(seconds):
             seconds = np.asarray(seconds)[frames]
             facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
-        elif _is_rate(rate):
+        elif is_rate(rate):
             facts["frame_rate"] = self._rate_of(rate, frames, times, grid)
         if isinstance(events, (list, tuple)) and (np.diff(frames) > 0).all():
             last = len(frames if grid is None else grid) - 1
@@ -390,10 +389,6 @@ def _on_line(x, xs, ys):
 
 def _frame_level(df):
     return df.index.get_level_values(-1)
-
-
-def _is_rate(rate):
-    return isinstance(rate, Real) and not isinstance(rate, bool) and 0 < rate < math.inf
 
 
 def _may_be_seconds(index):

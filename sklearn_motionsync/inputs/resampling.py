@@ -1,6 +1,8 @@
 """The times of frames: as numbers, in order, without gaps, and evenly spaced or made so."""
 
+import math
 import reprlib
+from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -15,17 +17,13 @@ __all__ = [
     "find_time_gaps",
     "interpolate",
     "is_even",
-    "look_like_events",
+    "is_rate",
     "rounded_rate",
     "times_as_numbers",
 ]
 
 # Steps of time longer than so many median steps are gaps.
 _GAP = 1.9
-# Of frames, fewer steps than this share are gaps or much shorter than the median step ...
-_UNEVEN = 0.35
-# ... and more times than this share come equally often.
-_ALIKE = 0.6
 # Times this share of a step from even ones are even.
 _EVEN = 1e-6
 # Rounding to digits of which a step has fewer than so many is no gap only where steps of both
@@ -78,36 +76,6 @@ def find_time_gaps(times, max_gap_time=None):
     return [(times[i], times[i + 1], step) for i in np.flatnonzero(steps > longest)]
 
 
-def look_like_events(times, with_signal=True):
-    """Whether times are those of events, such as spikes, and not those of frames.
-
-    Frames may have gaps, or come once for each of several recordings. The times of events are
-    uneven throughout, or rounded so coarsely that a varying number of them falls together.
-
-    Parameters
-    ----------
-    times : list of ndarray
-        Of each performance, in any order.
-    with_signal : bool, default=True
-        Whether anything is recorded along with the times. If not, the first uneven step decides.
-    """
-    n_uneven = n_steps = n_alike = n_times = n_rows = 0
-    for clock in times:
-        distinct, counts = np.unique(clock[np.isfinite(clock)], return_counts=True)
-        steps = np.diff(distinct)
-        if len(steps) < 2:
-            continue
-        step = np.median(steps)
-        n_uneven += np.sum((steps > _GAP * step) | (steps < step / _GAP))
-        n_steps += len(steps)
-        n_alike += np.sum(counts == np.median(counts))
-        n_times += len(distinct)
-        n_rows += counts.sum()
-    if not with_signal:
-        return n_uneven > 0 or n_rows > n_times
-    return n_uneven > _UNEVEN * n_steps or n_alike < _ALIKE * n_times
-
-
 def even_grid(times, frame_rate, what):
     """The even times that replace those of a performance; None if they are even themselves.
 
@@ -148,6 +116,11 @@ def interpolate(column, times, grid):
     """A feature at other times, on straight lines; NaN beside NaN."""
     column = as_numbers(column, f"Column {column.name!r}")
     return np.interp(grid, times, column).astype(column.dtype, copy=False)
+
+
+def is_rate(value):
+    """Whether a value is a number above 0 that can be a frame rate or a duration."""
+    return isinstance(value, Real) and not isinstance(value, bool) and 0 < value < math.inf
 
 
 def rounded_rate(rate):

@@ -1,8 +1,7 @@
 """Motion capture files, read and written; gaps, events and tracked key-points."""
 
-from .events import cut_at_events
+from .events import cut_at_events, keyframes_from_events
 from .gaps import fill_gaps, find_gaps
-from .keyframes import keyframes_from_events
 from .motion import read_motion
 from .poses import from_poses
 from .writing import write_motion

@@ -316,7 +316,7 @@ def _read_scale(file, parameters):
         f"{scale:g}. If positions are too large or too small, multiply them by "
         f"{scale / header:.6g}.",
         UserWarning,
-        stacklevel=5,
+        stacklevel=6,
     )
     return header
 

@@ -113,24 +113,8 @@ def fill_gaps(
 
     Notes
     -----
-    Each coordinate is interpolated by Akima's piecewise cubic polynomials. Gaps cut out of real
-    recordings are filled with these errors (RMS over 600 gaps, in millimetres; hands and feet of
-    HDM05 at 120 Hz, and the markers of a C3D file of walking at 50 Hz):
-
-    ======  ======  =====  =====  ======  ======  =====  =====  ======
-    gap of  HDM05                         markers
-    ------  ----------------------------  ----------------------------
-    frames  linear  PCHIP  Akima  spline  linear  PCHIP  Akima  spline
-    ======  ======  =====  =====  ======  ======  =====  =====  ======
-    5          3.4    1.6    1.0     0.9     4.0    2.6    2.4     3.0
-    10        11.6    5.9    3.2     2.0     9.0    5.1    4.2     4.5
-    20        36.4   22.6   10.8     9.2    26.5   16.1   13.1    15.1
-    40        85.6   56.5   38.3    35.0    62.4   43.2   40.3    41.8
-    ======  ======  =====  =====  ======  ======  =====  =====  ======
-
-    The cubic spline is best on HDM05's joints, which were smoothed before; Akima is best on
-    markers as they were recorded, where gaps occur. From 20 frames on the error of each is
-    centimetres.
+    Each coordinate is interpolated by Akima's piecewise cubic polynomials. From 20 frames on the
+    error is centimetres; the page "Work with gaps and hidden limbs" of the manual has a table.
 
     Leave longer gaps NaN. `DirectionCosines` with ``hidden="nan"`` and then `ASpace` take them:
     what was hidden is expected from the other limbs, and from the frames before and after. A
@@ -153,8 +137,10 @@ def fill_gaps(
     >>> fill_gaps(late, 2, ends="trim")["knee_y"].tolist()
     [1.0, 2.0, 3.0]
     """
-    check_max_gap(max_gap)
-    check_ends(ends)
+    if not isinstance(max_gap, Integral) or isinstance(max_gap, bool) or max_gap < 0:
+        raise ValueError(f"max_gap must be a whole number of frames, 0 or more, got {max_gap!r}.")
+    if ends not in ("keep", "trim"):
+        raise ValueError(f"ends must be 'keep' or 'trim', got {ends!r}.")
     _, n_dims, values = _read(df)
     missing = _missing(values, n_dims)
     seen = np.where(np.repeat(missing, n_dims, axis=1), np.nan, values)
@@ -187,62 +173,36 @@ def _trim(df, missing):
     return part
 
 
-def check_ends(ends):
-    if ends not in ("keep", "trim"):
-        raise ValueError(f"ends must be 'keep' or 'trim', got {ends!r}.")
-
-
-def check_max_gap(max_gap):
-    if not isinstance(max_gap, Integral) or isinstance(max_gap, bool) or max_gap < 0:
-        raise ValueError(f"max_gap must be a whole number of frames, 0 or more, got {max_gap!r}.")
-
-
 def warn_of_gaps(df, name):
-    """Warn of missing positions in a recording that a file was read into, if there are any."""
+    """Warn of what is missing in a recording that a file was read into, if anything is."""
     if not np.isnan(df.to_numpy()).any():
         return
-    gaps = find_gaps(df)
-    joints, _ = parse_joint_columns(df)
-    n_missing = gaps.groupby("joint")["n_frames"].sum()
-    n_outside = int((~gaps["inside"]).sum())
-    ends = f"; {n_outside} touch an end, where ends='trim' leaves frames out" if n_outside else ""
-    what = "positions" if df.attrs.get("kind", "joints") in _POSITIONS else "values"
-    warnings.warn(
-        _describe_missing(name, what, n_missing, df, len(joints), "joints")
-        + f": {counted(len(gaps), 'gap')}, the longest of "
-        f"{counted(gaps['n_frames'].max(), 'frame')}{ends}. Interpolate short gaps with "
-        "read_motion(..., max_gap=<frames>), list them with find_gaps(df), or drop "
-        "those columns.",
-        UserWarning,
-        stacklevel=3,
-    )
-
-
-def warn_of_missing(df, name):
-    """Warn of missing values in a table of channels that a file was read into."""
-    n_missing = df.isna().sum()
-    n_missing = n_missing[n_missing > 0]
-    if n_missing.empty:
-        return
-    warnings.warn(
-        _describe_missing(name, "values", n_missing, df, df.shape[1], "columns")
-        + ". Interpolate short gaps with df.interpolate(limit=<frames>, limit_area='inside'), or "
-        "drop those columns.",
-        UserWarning,
-        stacklevel=3,
-    )
-
-
-def _describe_missing(name, what, n_missing, df, n_columns, kind):
-    """How much is missing, and of which joints or columns, the worst first."""
+    kind = df.attrs.get("kind", "joints")
+    if "channels" in df.attrs:
+        n_missing, n_columns, what = df.isna().sum(), df.shape[1], "values"
+        n_missing = n_missing[n_missing > 0]
+        advice = ". Interpolate short gaps with df.interpolate(limit=<frames>, limit_area='inside')"
+    else:
+        gaps, n_columns = find_gaps(df), len(parse_joint_columns(df)[0])
+        n_missing = gaps.groupby("joint")["n_frames"].sum()
+        what = "positions" if kind in _POSITIONS else "values"
+        n_outside = int((~gaps["inside"]).sum())
+        ends = f"; {n_outside} touch an end, where ends='trim' leaves frames out" * bool(n_outside)
+        advice = (
+            f": {counted(len(gaps), 'gap')}, the longest of "
+            f"{counted(gaps['n_frames'].max(), 'frame')}{ends}. Interpolate short gaps with "
+            "read_motion(..., max_gap=<frames>), list them with find_gaps(df)"
+        )
     worst = n_missing.sort_values(ascending=False, kind="stable")
     names = ", ".join(str(column)[:40] for column in worst.index[:4])
     names += ", ..." if len(worst) > 4 else ""
     share = 100 * worst.sum() / (len(df) * n_columns)
     digits = 2 if share < 99 else 3
-    return (
+    warnings.warn(
         f"{name}: {share:.{digits}g} % of the {what} are missing (NaN), of {len(worst)} of "
-        f"{n_columns} {df.attrs.get('kind', kind)} ({names})"
+        f"{n_columns} {kind} ({names}){advice}, or drop those columns.",
+        UserWarning,
+        stacklevel=3,
     )
 
 
@@ -252,6 +212,11 @@ def _read(df):
         raise ValueError(
             f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}; "
             "name the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
+        )
+    if "channels" in df.attrs:
+        raise ValueError(
+            f"{name_recording(df)} has no positions but {df.attrs.get('kind', 'channels')}: "
+            "max_gap and ends go with positions."
         )
     joints, n_dims = parse_joint_columns(df)
     levels = df.index.droplevel(-1) if df.index.nlevels > 1 else df.index[:0]

@@ -9,18 +9,20 @@ from collections.abc import Callable, Iterable
 from pathlib import Path as FilePath
 from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
 
 from ..inputs.numbers import listed
+from ..inputs.recorded import SAME_RATE, is_thinned
+from ..inputs.resampling import is_rate
 from ..inputs.tables import FRAME
 from ..inputs.types import Path
 from ..inputs.wording import counted
 from .acclaim import read_acclaim
 from .bvh import read_bvh
 from .c3d import MissingGroup, read_c3d
-from .gaps import check_ends, check_max_gap, fill_gaps, warn_of_gaps, warn_of_missing
+from .gaps import fill_gaps, warn_of_gaps
 from .text import read_storage
-from .timestamps import check_frame_rate, describe_times, warn_of_other_rate
 from .trc import read_trc
 
 # The readers, by the ending of the file's name in small letters. A format is one function and one
@@ -65,25 +67,22 @@ def read_motion(
     Parameters
     ----------
     path : str, path-like, or iterable of them
-        A file whose name ends with ``.bvh``, ``.amc``, ``.c3d``, ``.trc``, ``.mot`` or ``.sto``, in
-        any case; or several, such as ``sorted(folder.glob("*.c3d"))``.
+        A file that ends with ``.bvh``, ``.amc``, ``.c3d``, ``.trc``, ``.mot`` or ``.sto``, in any
+        case; or several, such as ``sorted(folder.glob("*.c3d"))``.
     asf : str or path-like, default=None
-        The skeleton of an AMC file. By default the ``.asf`` file in the same folder with the
-        longest name that the AMC file's begins with (``02.asf`` for ``02_01.amc``), or the only
-        one there.
+        The skeleton of an AMC file. By default the ``.asf`` file of its folder with the longest
+        name that the AMC file's begins with (``02.asf`` for ``02_01.amc``), or the only one.
     frame_rate : float, default=None
         Frames per second. By default what the file says; AMC files mostly do not.
     max_gap : int, default=0
-        The longest gap to interpolate, in frames, for joints and markers; see `fill_gaps`. By
-        default none is.
+        The longest gap of joints and markers to interpolate, in frames; see `fill_gaps`.
     ends : {"keep", "trim"}, default="keep"
         "trim" leaves out the frames before the first and after the last one in which all joints or
         markers are seen; see `fill_gaps`. Other groups of the file are longer then.
     group : str, default=None
         The group of a C3D file to read: by default its "markers"; "angles", "forces", "moments",
-        "powers", "scalars" or "reactions", if the file says that some of its points are these;
-        "analog" for the analog channels recorded at the same time. ``attrs["groups"]`` lists
-        the groups of a file. Of several files those that have no such group are left out.
+        "powers", "scalars" or "reactions", if the file has such points; "analog" for the analog
+        channels. Of several files those that have no such group are left out.
     columns : {None, "common"}, default=None
         Of several files: "common" leaves out the columns that some of them lack, such as other
         markers, and brings the others into the order of the first. By default all stay. The joints
@@ -93,83 +92,42 @@ def read_motion(
     -------
     DataFrame (n_frames, 3 * n_joints), or list of DataFrame
         Of several files a list. Float64 columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint
-        by joint, and an index named "frame", from 0. Repeated names end with ``_2``, ``_3`` and so
-        on. A joint of a BVH file is the centre of its rotation, and ``<parent>_end`` an End Site; a
-        joint of an AMC file is the far end of the bone of that name. A marker that was not seen is
-        NaN: in a C3D file it is marked so, or at exactly (0, 0, 0) and without a camera; in a TRC
-        file it is blank, no number, or 0. The group "analog" has a column for each channel, in its
-        unit, and a row for each sample; a MOT or STO file a column for each of its own but the time
-        (vectors ``_x``, ``_y``, ``_z``, quaternions ``_w``, ``_x``, ``_y``, ``_z``).
-        Its ``attrs`` hold
+        by joint, and an index named "frame", from 0. A marker that was not seen is NaN. The group
+        "analog" has a column for each channel, and a row for each sample; a MOT or STO file a
+        column for each of its own but the time. The manual's page of motion files lists its
+        ``attrs``, which hold
 
         format : {"bvh", "amc", "c3d", "trc", "mot", "sto"}
             The ending of the file.
         frame_rate : float or None
             Frames per second, None if it is not known, or if times are uneven.
-        units : str or None
-            "m" for AMC, the unit that the file states for C3D and TRC ("mm"), None for BVH, which
-            has none. For the group "analog" a list, one for each channel. For MOT and STO "deg"
-            or "rad", the unit of the angles; lengths are in metres there.
+        units : str, list of str or None
+            That the file states; a list for the group "analog", one for each channel.
         up : {"y", "z"} or None
-            The vertical axis, None if a C3D file does not state it, and for TRC, MOT and STO.
+            The vertical axis, if the file states it or its format has one.
         kind : str
-            "joints", "markers", or for C3D the group; for MOT and STO "forces" if the names of all
-            columns contain force, torque or moment, else "coordinates".
-        joints : list of str
-            Names of the joints or markers; for the group "analog", MOT and STO ``channels``
-            instead.
-        parents : list of int
-            Index of each joint's parent, -1 for a root and for markers.
+            What was measured: "joints", "markers" or another group; of MOT and STO "forces" or
+            "coordinates".
+        joints, parents : list of str, list of int
+            Names of the joints or markers, and the index of each one's parent, -1 for a root; for
+            the group "analog", MOT and STO ``channels`` instead.
         performance, levels : str, list of str
-            The label of the recording in tables, which is the name of its file without the ending;
-            and the names of the levels of their index, "recording" and "frame".
-
-        for BVH files also
-
-        rig : dict
-            ``offsets`` of the joints at rest and their ``channels``, which `write_motion` takes.
-
-        for C3D and TRC files also
-
-        first_frame : int
-            The number of frame 0 in its trial.
-
-        for TRC, MOT and STO files also
-
-        first_time : float
-            The time of frame 0, in seconds.
-        times : list of float
-            The times of all frames in seconds, only if they are uneven.
-
-        and for C3D files also
-
-        events : list of dict
-            The events marked in the recording, by time: ``label``, ``context`` (such as "Left",
-            or None), ``time`` in seconds of the trial, and ``frame``, its position in the frames
-            returned, from 0 and with fractions. It may lie outside of them, and is None if
-            the file has no frame rate.
-        groups : dict of str to dict
-            The number of members of each group (``n``), their ``units`` and ``frame_rate``.
-        left_out : str
-            The other contents of the file, in one line, such as "12 angles, 16 analog channels at
-            1000 Hz, the geometry of 2 force plates"; empty if there are none.
+            The name of the file without the ending, and the names of the levels of an index.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        If the ending is not known; the message lists those that are. If the file is damaged or
-        not complete, or has numbers of 1e12 and more (BVH, AMC); the message names the line or
-        byte. If the result would take more than 64 MB and more than 32 times the size of the file.
+        If the ending is not known, or the file is damaged or not complete; the message names the
+        line or byte. If the result would take more than 64 MB and 32 times the size of the file.
 
     Warns
     -----
     UserWarning
-        If positions or values are missing; the message says how many, and of which markers or
-        columns. If times are uneven, or contradict the frame rate that the file states, unless
-        `frame_rate` is given. Of several files, if one is left out for it lacks the group, and
-        if columns are left out. If a C3D file states two scales.
+        If positions or values are missing; if times are uneven, or contradict the frame rate that
+        the file states, unless `frame_rate` is given; if a file or columns of several are left
+        out; if a C3D file states two scales.
 
     See Also
     --------
@@ -179,29 +137,14 @@ def read_motion(
 
     Examples
     --------
-    >>> from sklearn_motionsync.io import read_motion
-    >>> path = getfixture("tmp_path") / "arm.bvh"
-    >>> _ = path.write_text('''HIERARCHY
-    ... ROOT arm
-    ... {
-    ...   OFFSET 0 0 0
-    ...   CHANNELS 1 Zrotation
-    ...   End Site { OFFSET 2 0 0 }
-    ... }
-    ... MOTION
-    ... Frames: 2
-    ... Frame Time: 0.01
-    ... 0
-    ... 90
-    ... ''')
+    >>> from sklearn_motionsync.datasets import make_walk
+    >>> from sklearn_motionsync.io import read_motion, write_motion
+    >>> walk, path = make_walk(1, random_state=0), getfixture("tmp_path") / "walk.trc"
+    >>> write_motion(path, walk.data[0], walk.skeleton, frame_rate=100)
     >>> df = read_motion(path)
-    >>> df[["arm_end_x", "arm_end_y"]].round(6).to_numpy().tolist()
-    [[2.0, 0.0], [0.0, 2.0]]
-    >>> df.attrs["frame_rate"], df.attrs["joints"], df.attrs["parents"]
-    (100.0, ['arm', 'arm_end'], [-1, 0])
+    >>> list(df.columns[:3]), df.attrs["frame_rate"], df.attrs["units"]
+    (['pelvis_x', 'pelvis_y', 'pelvis_z'], 100.0, 'm')
     """
-    check_max_gap(max_gap)
-    check_ends(ends)
     check_frame_rate(frame_rate)
     if columns not in (None, "common") or (columns and isinstance(path, (str, os.PathLike))):
         raise ValueError(
@@ -211,9 +154,28 @@ def read_motion(
     options: dict[str, Any] = {"asf": asf, "group": group}
     if not isinstance(path, (str, os.PathLike)):
         options |= {"frame_rate": frame_rate, "max_gap": max_gap, "ends": ends}
-        recordings = _read_several(path, options)
-        return _keep_common(recordings) if columns else recordings
+        return _read_several(path, columns, options)
     path = FilePath(path)
+    motion = _read_file(path, options)
+    if "times" in motion:
+        motion |= describe_times(
+            path.name,
+            motion.pop("times"),
+            stated=motion["frame_rate"],
+            decimals=motion.pop("decimals"),
+            frame_rate=frame_rate,
+        )
+    elif frame_rate is not None:
+        motion["frame_rate"] = float(frame_rate)
+    df = _to_frame(motion, path)
+    if max_gap != 0 or ends != "keep":
+        df = fill_gaps(df, max_gap, ends=ends)
+    warn_of_gaps(df, path.name)
+    return df
+
+
+def _read_file(path, options):
+    """What the reader of a file returns, which is given the options that were chosen."""
     if not path.is_file():
         raise FileNotFoundError(f"There is no motion file at {path}.")
     reader = READERS.get(path.suffix.lower())
@@ -229,34 +191,11 @@ def read_motion(
             raise ValueError(
                 f"{name}= goes with {_join(endings)} files only, got {name}={value!r} with {path}."
             )
-    motion = reader(path, **options)
-    stated = motion["frame_rate"]
-    if "times" in motion:
-        times, decimals = motion.pop("times"), motion.pop("decimals")
-        motion |= describe_times(
-            path.name, times, stated=stated, decimals=decimals, frame_rate=frame_rate
-        )
-        if frame_rate is None:
-            warn_of_other_rate(path.name, stated, motion["frame_rate"])
-    elif frame_rate is not None:
-        motion["frame_rate"] = float(frame_rate)
-    df = _to_frame(motion, path)
-    if "joints" not in df.attrs:
-        if max_gap or ends != "keep":
-            raise ValueError(
-                f"max_gap and ends go with positions, got max_gap={max_gap} frames for the "
-                f"{df.attrs['kind']} of {path}, and ends={ends!r}."
-            )
-        warn_of_missing(df, path.name)
-        return df
-    if max_gap or ends != "keep":
-        df = fill_gaps(df, max_gap, ends=ends)
-    warn_of_gaps(df, path.name)
-    return df
+    return reader(path, **options)
 
 
-def _read_several(paths, options):
-    """The recordings of those files that have the group."""
+def _read_several(paths, columns, options):
+    """The recordings of those files that have the group, with all columns or the common ones."""
     recordings, refused = [], []
     for path in paths:
         try:
@@ -267,7 +206,7 @@ def _read_several(paths, options):
         raise refused[0] if refused else ValueError("There are no files to read, got none.")
     for missing in refused:
         warnings.warn(f"{missing} The file is left out.", UserWarning, stacklevel=3)
-    return recordings
+    return _keep_common(recordings) if columns else recordings
 
 
 def _keep_common(recordings):
@@ -291,7 +230,7 @@ def _keep_common(recordings):
             f"{len(recordings)} files have {counted(len(common), 'column')} in common. Left out "
             f"are {listing}.",
             UserWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     result = []
     for x in recordings:
@@ -321,3 +260,108 @@ def _to_frame(motion, path):
     df.attrs = {"format": path.suffix.lower().removeprefix(".")} | motion
     df.attrs |= {"performance": path.stem, "levels": ["recording", FRAME]}
     return df
+
+
+# -- times of frames: even ones give a frame rate, uneven ones are kept and warned of --------------
+
+# A share of a step by which even times may miss their places, beside rounding.
+_JITTER = 0.1
+# A larger share is never explained by rounding: half a step is what one lost frame leaves.
+_MAX_JITTER = 0.45
+# A step this many times longer than it should be is a gap.
+_GAP = 1.9
+# Seconds; no recording has shorter steps.
+_SHORTEST_STEP = 1e-9
+
+
+def check_frame_rate(frame_rate):
+    if frame_rate is not None and not is_rate(frame_rate):
+        raise ValueError(f"frame_rate must be frames a second, above 0, got {frame_rate!r}.")
+
+
+def describe_times(
+    name, times, *, stated=None, decimals=17, frame_rate=None, unit="s", may_be_thinned=False
+):
+    """The ``attrs`` of a recording that describe its times.
+
+    Parameters
+    ----------
+    name : str
+        Name of the recording, for the warning.
+    times : ndarray (n_frames,)
+        The times of the frames, not decreasing.
+    stated : float or None
+        The frame rate that the file states. It counts where the times agree with it, as far as
+        their digits allow.
+    decimals : int
+        How many decimals the times were written with.
+    frame_rate : float or None
+        The frame rate that the caller of the reader gives. It replaces all others.
+    unit : {"s", "frames"}
+        Unit of the times. Those in frames give no frame rate.
+    may_be_thinned : bool
+        Whether every second or k-th frame of the stated rate is no contradiction.
+
+    Returns
+    -------
+    dict
+        ``frame_rate`` (None if it is not known), ``first_time`` where times are in seconds,
+        ``times`` where they are uneven.
+
+    Warns
+    -----
+    UserWarning
+        In the caller's caller: if times are uneven, or contradict the stated rate, and no
+        `frame_rate` is given.
+    """
+    rate, even = _estimate_frame_rate(times, decimals, stated)
+    facts = {"frame_rate": rate if unit == "s" else None}
+    if unit == "s":
+        facts["first_time"] = float(times[0])
+    if not even:
+        facts["times"] = times.tolist()
+    if frame_rate is not None:
+        facts["frame_rate"] = float(frame_rate)
+    elif not even:
+        steps = np.diff(times)
+        warnings.warn(
+            f"{name}: its times are uneven, in steps of {steps.min():.4g} to {steps.max():.4g} "
+            f"{unit}, but frames count as evenly spaced. df.attrs['times'] holds them; "
+            "to_sequences(df.assign(time=df.attrs['times']), time='time') makes them even. If they "
+            "are even in truth, give frame_rate=.",
+            UserWarning,
+            stacklevel=3,
+        )
+    elif stated and facts["frame_rate"] not in (None, stated):
+        if may_be_thinned and is_thinned(rate, stated):
+            return facts
+        warnings.warn(
+            f"{name}: it says {stated:g} frames a second, but by its times there are {rate:g}, "
+            "which is used. If the times are wrong, give frame_rate=.",
+            UserWarning,
+            stacklevel=3,
+        )
+    return facts
+
+
+def _estimate_frame_rate(times, decimals, stated):
+    """Frames a second of the times, None where it cannot be estimated, and whether they are even.
+
+    The stated rate is returned where the times agree with it.
+    """
+    step = (times[-1] - times[0]) / max(len(times) - 1, 1)
+    if len(times) < 2 or step < _SHORTEST_STEP:
+        return stated, len(times) < 2 or stated is not None
+    # Times have few digits: 0.033, 0.067, 0.1.
+    rate = float(f"{1 / step:.6g}")
+    rounding = 10.0**-decimals
+    # With few frames the digits leave the rate uncertain.
+    blur = rounding / (len(times) - 1)
+    agree = stated is not None and abs(step - 1 / stated) < max(
+        SAME_RATE / stated, min(blur, step / 4)
+    )
+    off = times - step * np.arange(len(times))
+    even = np.ptp(off) / 2 <= min(_JITTER * step + rounding / 2, _MAX_JITTER * step)
+    if agree and (even or np.diff(times).max() < _GAP * max(step, rounding)):
+        return stated, True
+    return (rate, True) if even else (None, False)

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..inputs.recorded import is_thinned
 from ..inputs.tables import FRAME, label_of_part
-from .gaps import check_max_gap, fill_gaps
+from .gaps import fill_gaps
+from .motion import check_frame_rate, describe_times
 from .text import make_unique
-from .timestamps import check_frame_rate, describe_times, warn_of_other_rate
 
 _DIMENSIONS = ("time", "individual", "keypoint", "space")
 # Older names of some of them.
@@ -91,7 +90,6 @@ def from_poses(
     >>> list(ann.columns), ann.attrs["frame_rate"], ann.attrs["performance"]
     (['hip_x', 'hip_y', 'knee_x', 'knee_y'], 30.0, 'ann')
     """
-    check_max_gap(max_gap)
     check_frame_rate(frame_rate)
     if not isinstance(min_confidence, Real | None):
         raise ValueError(f"min_confidence must be a number such as 0.6, got {min_confidence!r}.")
@@ -114,9 +112,9 @@ def from_poses(
     if times is None:
         facts["frame_rate"] = fps if frame_rate is None else float(frame_rate)
     else:
-        facts |= describe_times("The poses", times, stated=fps, frame_rate=frame_rate, unit=unit)
-        if frame_rate is None and not is_thinned(facts["frame_rate"], fps):
-            warn_of_other_rate("The poses", fps, facts["frame_rate"])
+        facts |= describe_times(
+            "The poses", times, stated=fps, frame_rate=frame_rate, unit=unit, may_be_thinned=True
+        )
     joints = make_unique(_read_names(position, "keypoint"))
     facts |= {"kind": "keypoints", "joints": joints, "parents": [-1] * len(joints)}
     columns = [f"{joint}_{axis}" for joint in joints for axis in sorted(axes)]
@@ -127,7 +125,7 @@ def from_poses(
         df.attrs = facts | {"performance": individual, "levels": ("individual", FRAME)}
         if performance is not None:
             df.attrs |= label_of_part(performance, individual, "individual")
-        recordings.append(fill_gaps(df, max_gap) if max_gap else df)
+        recordings.append(df if max_gap == 0 else fill_gaps(df, max_gap))
     return recordings
 
 

@@ -18,8 +18,7 @@ from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import frame_rate_of_rows, start_of_rows
 from ..inputs.types import Path, PerformanceLike, Table
 from ..inputs.wording import counted
-from .motion import read_motion
-from .timestamps import check_frame_rate
+from .motion import check_frame_rate, read_motion
 
 __all__ = [
     "Rig",

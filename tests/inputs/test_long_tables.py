@@ -734,39 +734,14 @@ def test_a_label_that_is_no_feature_is_told_of(values):
 # -- tables with a row an event -------------------------------------------------------------
 
 
-def spikes_of(n_units, digits, whole=False):
-    """Six trials of two seconds, with about seven spikes a second of each unit."""
-    rng = np.random.default_rng(n_units)
-    parts = [
-        pd.DataFrame({"trial": trial, "unit": unit, "spike_time": np.sort(rng.uniform(0, 2, 14))})
-        for trial in range(6)
-        for unit in range(n_units)
-    ]
-    df = pd.concat(parts, ignore_index=True).round({"spike_time": digits})
-    return df.assign(spike_time=(df["spike_time"] * 1000).astype(int)) if whole else df
-
-
-@pytest.mark.parametrize(("n_units", "whole"), [(1, False), (24, True), (300, False)])
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"by": "trial", "time": "spike_time"},
-        {"by": ["trial", "unit"], "time": "spike_time"},
-        {"by": ["trial", "unit"], "time": "spike_time", "max_gap_time": 2000},
-        {"by": "trial"},
-        {"by": ["trial", "unit"]},
-    ],
-)
-def test_tables_of_spikes_are_refused(n_units, whole, given):
-    df = spikes_of(n_units, 3, whole)
-    with pytest.raises(ValueError, match=r"events, such as spikes: times in 'spike_time'.*rates"):
-        to_sequences(df, **given)
-
-
-def test_spikes_of_one_source_are_refused():
-    df = spikes_of(1, 6)[["trial", "spike_time"]]
-    with pytest.raises(ValueError, match=r"such as spikes.* only labels and no signal"):
-        to_sequences(df, by="trial", time="spike_time")
+def test_tables_of_spikes_are_refused():
+    """Their times come twice, or have gaps; the message tells what to do."""
+    rng = np.random.default_rng(0)
+    times = [np.sort(rng.uniform(0, 2, 14)).round(digits) for digits in (6, 1)]
+    for time, message in zip(times, ("has a gap", "come twice"), strict=True):
+        df = pd.DataFrame({"trial": 1, "unit": 3, "spike_time": time})
+        with pytest.raises(ValueError, match=rf"{message}.*such as spikes, become rates first"):
+            to_sequences(df, by=["trial", "unit"], time="spike_time")
 
 
 @pytest.mark.parametrize(
@@ -796,14 +771,3 @@ def test_whole_numbers_of_several_recordings_are_no_events():
     df = pd.concat(parts).assign(trial=1)
     with pytest.raises(ValueError, match=r"come twice.*Name in by= all columns"):
         to_sequences(df, by="trial", time="time")
-
-
-def test_warps_and_counts_of_spikes_are_no_events():
-    rng = np.random.default_rng(0)
-    rise = np.cumsum(rng.exponential(size=(2, 50)), axis=1).ravel()
-    df = pd.DataFrame({"trial": np.repeat([1, 2], 50), "frame": np.tile(np.arange(50), 2)})
-    for column in (df.assign(time=rise), df[["trial"]].assign(time=rise)):
-        assert [len(x) for x in to_sequences(column, by="trial")] == [50, 50]
-    counts = df.assign(time=df["frame"] / 10, n_spikes=rng.poisson(2, 100))
-    assert [x.shape for x in to_sequences(counts, by="trial", time="time")] == [(50, 2)] * 2
-    assert [len(x) for x in to_sequences(counts.drop(columns="time"), by="trial")] == [50, 50]

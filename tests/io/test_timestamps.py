@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from sklearn_motionsync.io.timestamps import describe_times, warn_of_other_rate
+from sklearn_motionsync.io.motion import describe_times
 
 STEP = 0.02
 
@@ -36,7 +36,10 @@ def test_even_times_have_their_rate(rate, n_frames, start):
 @pytest.mark.parametrize("n_frames", [2, 40])
 def test_exact_times_count_more_than_another_stated_rate(share, n_frames):
     times = np.arange(n_frames) * STEP
-    assert described(times, stated=50 * share)["frame_rate"] == 50
+    message = rf"^a\.trc: it says {50 * share:g} frames a second, but by its times there are 50, "
+    with pytest.warns(UserWarning, match=message):
+        facts = describe_times("a.trc", times, stated=50 * share)
+    assert facts == {"frame_rate": 50, "first_time": 0}
     # In frames they say nothing of seconds, and the caller's rate replaces all others.
     assert described(times, stated=50 * share, unit="frames") == {"frame_rate": None}
     given = described(times, stated=50 * share, frame_rate=7)["frame_rate"]
@@ -123,14 +126,3 @@ def test_times_without_a_duration_have_the_stated_rate():
         facts = describe_times("a.trc", np.zeros(2))
     assert facts == {"frame_rate": None, "first_time": 0.0, "times": [0.0, 0.0]}
     assert described(np.arange(9) * 2e-9)["frame_rate"] == 5e8
-
-
-@pytest.mark.parametrize(
-    ("stated", "rate", "warned"),
-    [(50, 60.0, True), (50.0, 50, False), (None, 50, False), (50, None, False), (0, 9.0, False)],
-)
-def test_a_rate_is_another_one_if_both_are_known_and_differ(stated, rate, warned):
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        warn_of_other_rate("a.trc", stated, rate)
-    assert len(caught) == warned
