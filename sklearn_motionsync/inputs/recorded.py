@@ -68,7 +68,7 @@ def recorded_frames(df):
         In the order of the rows. None if the index does not tell.
     """
     index, clock = _frame_level(df), df.attrs.get(CLOCK)
-    if isinstance(index, pd.RangeIndex) and not _may_be_seconds(index):
+    if isinstance(index, pd.RangeIndex) and not names_seconds(index.name):
         return index.to_numpy() if index.min() >= 0 or not len(index) else None
     if index.dtype.kind not in "iuf":
         return None
@@ -77,7 +77,9 @@ def recorded_frames(df):
         return None
     if index.dtype.kind == "f" and isinstance(clock, (tuple, list)):
         values, slack = (values - clock[0]) / clock[1], _ROUNDING
-    elif _may_be_seconds(index) and (index.dtype.kind == "f" or _smallest_step(values) > 1):
+    elif names_seconds(index.name) and (
+        index.dtype.kind == "f" or np.abs(np.diff(values)).min(initial=np.inf) > 1
+    ):
         # Whole seconds, or every tenth frame, or milliseconds.
         return None
     frames = np.round(values)
@@ -391,17 +393,9 @@ def _frame_level(df):
     return df.index.get_level_values(-1)
 
 
-def _may_be_seconds(index):
-    return names_seconds(index.name)
-
-
-def _smallest_step(values):
-    return np.abs(np.diff(values)).min(initial=np.inf)
-
-
 def _rate_of_seconds(index):
     """The frame rate of even times in seconds; None of all else."""
-    if len(index) < 2 or not (index.dtype.kind in "mM" or _may_be_seconds(index)):
+    if len(index) < 2 or not (index.dtype.kind in "mM" or names_seconds(index.name)):
         return None
     if index.dtype.kind not in "mMfiu":
         return None

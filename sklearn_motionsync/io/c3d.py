@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 
+from ..inputs.wording import counted
 from .text import decode, make_unique
 
 _BLOCK = 512
@@ -145,9 +146,9 @@ class _Parameters:
         groups, members = {}, []
         data, at = file.data, file.first_parameter
         n_blocks = data[at + 2]
-        counted = min(len(data), at + n_blocks * _BLOCK) if n_blocks else len(data)
+        stated_end = min(len(data), at + n_blocks * _BLOCK) if n_blocks else len(data)
         # Writers count wrongly, and one byte is too little for many; the data bound them.
-        end = file.data_start if at < file.data_start < len(data) else counted
+        end = file.data_start if at < file.data_start < len(data) else stated_end
         at += 4
         # Every entry is longer than 4 bytes, so this comes to an end.
         while at + 4 < end and data[at] and data[at + 1]:
@@ -159,7 +160,7 @@ class _Parameters:
                 step = step >> 8 | (step & 0xFF) << 8
             content = data[link + 2 : min(end, link + step) if step else end]
             if link + 2 > end or link + step > end or step == 1:
-                if at >= counted:
+                if at >= stated_end:
                     break  # no parameters follow here
                 raise self._error(at, "leads out of the parameters")
             name = decode(data[at + 2 : link]).strip().upper()
@@ -507,10 +508,6 @@ def _check_group(file, groups, group):
 
 def _describe_others(parameters, groups, group, n_untimed):
     """The contents of the file beside the group, in one line; empty if there are none."""
-
-    def plural(n, noun):
-        return f"{n:g} {noun}" if n == 1 else f"{n:g} {noun}s"
-
     contents = []
     for name, facts in groups.items():
         if name == group or not facts["n"]:
@@ -518,12 +515,12 @@ def _describe_others(parameters, groups, group, n_untimed):
         if name == "analog":
             rate = facts["frame_rate"]
             at = "" if rate is None else f" at {rate:g} Hz"
-            contents.append(f"{plural(facts['n'], 'analog channel')}{at}")
+            contents.append(f"{counted(facts['n'], 'analog channel')}{at}")
         else:
-            contents.append(plural(facts["n"], name.removesuffix("s")))
+            contents.append(counted(facts["n"], name.removesuffix("s")))
     plates = parameters.number("FORCE_PLATFORM", "USED", 0)
     if math.isfinite(plates) and plates > 0:
-        contents.append(f"the geometry of {plural(plates, 'force plate')}")
+        contents.append(f"the geometry of {counted(plates, 'force plate')}")
     if n_untimed:
-        contents.append(f"{plural(n_untimed, 'event')} without a time")
+        contents.append(f"{counted(n_untimed, 'event')} without a time")
     return ", ".join(contents)

@@ -192,14 +192,8 @@ def _read_events(df, name):
 
 def _select(events, what, name, recording):
     """Events of a label, or of a label and a context."""
-    wanted = (what,) if isinstance(what, str) else what
-    good = isinstance(wanted, (tuple, list)) and len(wanted) in (1, 2)
-    if not good or not all(isinstance(word, str) for word in wanted):
-        raise ValueError(
-            f"{name} must be the label of an event, or a pair of label and context, got {what!r}."
-        )
-    wanted = [word.strip().casefold() for word in wanted]
-    selected = [event for event in events if _words_of(event)[: len(wanted)] == wanted]
+    words = _words_asked_for(what, name)
+    selected = [event for event in events if _words_of(event)[: len(words)] == words]
     if not selected:
         kinds = Counter((event["label"], event.get("context")) for event in events)
         listed = ", ".join(
@@ -208,6 +202,17 @@ def _select(events, what, name, recording):
         listed = listed if len(listed) <= 300 else f"{listed[:300]} ..."
         raise ValueError(f"{recording} has no event {what!r} for {name}; there are {listed}.")
     return selected
+
+
+def _words_asked_for(what, name):
+    """A label, or a label and a context, as `_words_of` has those of events."""
+    words = (what,) if isinstance(what, str) else what
+    good = isinstance(words, (tuple, list)) and len(words) in (1, 2)
+    if not good or not all(isinstance(word, str) for word in words):
+        raise ValueError(
+            f"{name} must be the label of an event, or a pair of label and context, got {what!r}."
+        )
+    return [word.strip().casefold() for word in words]
 
 
 def _words_of(event):
@@ -529,36 +534,24 @@ class _Columns:
     """The names of the columns, as chosen or as events have them."""
 
     def __init__(self, names):
-        self._by_words, self._chosen = {}, names
+        self._by_words, self._chosen = {}, None
         if names is not None:
-            self._chosen = [name if isinstance(name, tuple) else (name,) for name in names]
-            for name in self._chosen:
-                if len(name) > 2 or not all(isinstance(word, str) for word in name):
-                    raise ValueError(
-                        f"names must be labels of events, or pairs of label and context; got "
-                        f"{name!r} among them."
-                    )
+            self._chosen = {
+                name: _words_asked_for(name, "each of names") for name in map(_plain_name, names)
+            }
 
     def name(self, label, context):
         """The column of an event; None if it is not chosen."""
-        words = tuple(_words_of({"label": label, "context": context}))
-        if words not in self._by_words:
-            self._by_words[words] = (label, context) if words[1] else label
+        words = _words_of({"label": label, "context": context})
+        known = self._by_words.setdefault(tuple(words), (label, context) if words[1] else label)
         if self._chosen is None:
-            return self._by_words[words]
-        for name in self._chosen:
-            wanted = tuple(word.strip().casefold() for word in name)
-            if words[: len(wanted)] == wanted:
-                return name if len(name) > 1 else name[0]
-        return None
+            return known
+        return next((name for name, ask in self._chosen.items() if words[: len(ask)] == ask), None)
 
     def names(self, rows):
         """Those that are known in some trial: all of the chosen ones."""
         placed = dict.fromkeys(name for row in rows for name in row)
-        if self._chosen is None:
-            wanted = list(placed) or ["any"]
-        else:
-            wanted = [name if len(name) > 1 else name[0] for name in self._chosen]
+        wanted = list((placed if self._chosen is None else self._chosen) or ["any"])
         missing = [name for name in wanted if name not in placed]
         if missing:
             there = list(self._by_words.values())
@@ -569,6 +562,12 @@ class _Columns:
                 else "No trial has an event: give a table, or trials with attrs['events']."
             )
         return wanted
+
+
+def _plain_name(name):
+    """A label alone as text; a list as a tuple, which names a column."""
+    name = tuple(name) if isinstance(name, list) else name
+    return name[0] if isinstance(name, tuple) and len(name) == 1 else name
 
 
 def _place(trial, events, clock, columns):

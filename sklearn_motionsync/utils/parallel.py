@@ -7,7 +7,6 @@ portions are shared out.
 
 import contextlib
 import functools
-import os
 import threading
 import time
 from typing import Any
@@ -180,18 +179,6 @@ def _allow_any_thread():
     for library in _blas().lib_controllers:
         if hasattr(library, "clear_controlling_thread"):
             library.clear_controlling_thread(force=True)
-
-
-def _forget_parent():
-    """A child process has none of the threads of its parent, whose contexts never end here."""
-    global _blas_lock
-    _blas_lock = threading.RLock()
-    _blas_contexts.clear()
-    _restore_blas()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget_parent)
 
 
 # -- progress ----------------------------------------------------------------------------

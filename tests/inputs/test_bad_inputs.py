@@ -23,8 +23,8 @@ SYNCHRONIZERS = [
     DenseSynchronizer(),
     ShiftSynchronizer(),
 ]
-# Input is checked in one place: an estimator of rows and two of sequences stand for all others.
-SEQUENCES = [LinearSynchronizer(), ShiftSynchronizer()]
+# Input is checked in one place: an estimator of rows and one of sequences stand for all others.
+SEQUENCES = [LinearSynchronizer()]
 ALL = [ASpace(), *SEQUENCES]
 # Those that take no gaps.
 WHOLE = [ShiftSynchronizer()]

@@ -10,16 +10,6 @@ from sklearn_motionsync.io import read_motion
 from motion_files import body, joint, put
 
 
-@pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
-def test_positions_agree_with_plain_matrices(tmp_path, benchmark, order):
-    path = put(tmp_path, body(order))
-    df = read_motion(path)
-    assert df.attrs["joints"] == ["hips", "spine", "neck", "neck_end", "leg", "foot"]
-    assert df.attrs["parents"] == [-1, 0, 1, 2, 0, 4]
-    expected = benchmark("readers").plain_bvh(path)
-    np.testing.assert_allclose(df, expected.reshape(3, -1), atol=1e-10)
-
-
 def test_position_channels_replace_offset_and_the_first_rotation_is_the_outermost(tmp_path):
     text = (
         "HIERARCHY ROOT a { OFFSET 9 9 9 CHANNELS 2 Zposition Xposition JOINT b { OFFSET 1 0 0 "

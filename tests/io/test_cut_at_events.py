@@ -171,6 +171,9 @@ def test_groups_of_a_file_are_cut_at_the_same_times(tmp_path, group):
     assert part.attrs["first_frame"] == 101 + bounds[0] // k
     assert [e["frame"] for e in part.attrs["events"]] == [15 * k - bounds[0]]
     np.testing.assert_array_equal(part, df.iloc[int(bounds[0]) : int(bounds[1]) + 1])
+    (same,) = cut_at_events(df.iloc[3:], "Strike")
+    pd.testing.assert_frame_equal(part, same)
+    assert part.attrs == same.attrs
 
 
 def test_a_static_trial_without_events_gives_none_and_is_named():

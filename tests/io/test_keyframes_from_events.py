@@ -165,8 +165,7 @@ def test_bad_tables_are_refused(name):
         ({"by": "subject"}, "must name 2 columns of events, for the levels"),
         ({"by": ["subject", "rep"]}, "must name 2 columns"),
         ({"names": ["apex"]}, r"No trial has the event 'apex' .*; there are \['"),
-        ({"names": [3]}, r"labels of events, or pairs of label and context; got \(3,\)"),
-        ({"names": [("a", "b", "c")]}, "labels of events, or pairs"),
+        ({"names": [3]}, "each of names must be the label of an event, or a pair .*, got 3"),
     ],
 )
 def test_bad_arguments_are_refused(given, message):

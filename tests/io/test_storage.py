@@ -96,15 +96,6 @@ def test_missing_values_are_nan_with_a_warning(tmp_path, nothing):
     assert df.interpolate(limit=10, limit_area="inside").notna().all(axis=None)
 
 
-@pytest.mark.parametrize(("n", "names"), [(4, "e, d, c, b"), (5, "f, e, d, c, ...")])
-def test_warning_names_four_columns_the_worst_first(tmp_path, n, names):
-    values = np.ones((50, 6))
-    for k in range(1, 1 + n):
-        values[:k, k] = np.nan
-    with pytest.warns(UserWarning, match=rf"of {n} of 6 coordinates \({names}\)"):
-        read(tmp_path, storage(values, list("abcdef")))
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sklearn_motionsync.io.text as text_module
 from sklearn_motionsync.io.text import (
     MotionText,
     check_result_size,
@@ -145,14 +146,15 @@ def test_tables_are_read_and_the_line_of_an_error_is_named(tmp_path, seed, blank
 
 
 @pytest.mark.parametrize("end", ["", "\n"])
-def test_tables_of_several_portions_are_one(tmp_path, end):
-    """Of 4 MB each, and 5 numbers of 9 bytes a line."""
-    values = np.random.default_rng(0).integers(10**7, 10**8, (200_000, 5)).astype(float)
+def test_tables_of_several_portions_are_one(tmp_path, monkeypatch, end):
+    """Of 4 kB each, and 5 numbers of 9 bytes a line."""
+    monkeypatch.setattr(text_module, "_PORTION", 2**12)
+    values = np.random.default_rng(0).integers(10**7, 10**8, (200, 5)).astype(float)
     lines = [" ".join(f"{x:.0f}" for x in row) for row in values.tolist()]
     text = opened(tmp_path, "\n".join(lines) + end)
     np.testing.assert_array_equal(text.table(5, "a frame"), values)
     assert (text.n_left, text.line_number) == (0, len(lines))
-    for k in (93_207, 199_999):
+    for k in (93, 199):
         other = "\n".join([*lines[:k], lines[k] + " 1", *lines[k + 1 :]]) + end
         with pytest.raises(ValueError, match=rf"line {k + 1}: a frame needs 5 numbers, got 6"):
             opened(tmp_path, other).table(5, "a frame")

@@ -139,18 +139,6 @@ def test_markers_are_kept_if_all_are_at_the_origin(tmp_path):
     assert (read(tmp_path, trc(np.zeros((9, 1, 3)), ["a"])) == 0).all(axis=None)
 
 
-@pytest.mark.parametrize(("off", "even"), [(0.002, True), (0.003, False)])
-def test_even_times_miss_their_places_by_a_tenth_of_a_step_and_half_a_digit(tmp_path, off, even):
-    """0.0025 s in steps of 0.02 s with three digits, where no rate is stated."""
-    times = 1 + np.arange(41) / 50 + off * (-1.0) ** np.arange(41)
-    text = trc(tracks(41), NAMES, times=times).replace("DataRate\tC", "Rate\tC")
-    if even:
-        assert read(tmp_path, text).attrs["frame_rate"] == 50
-    else:
-        with pytest.warns(UserWarning, match="its times are uneven"):
-            assert read(tmp_path, text).attrs["frame_rate"] is None
-
-
 def test_rate_of_data_is_used_not_that_of_cameras(tmp_path):
     df = read(tmp_path, trc(tracks(), NAMES, CameraRate="200.00", OrigDataRate="200.00"))
     assert df.attrs["frame_rate"] == 50

@@ -1,13 +1,11 @@
 """One thread for the linear algebra of a portion; afterwards the process is as before."""
 
 import gc
-import multiprocessing
 import os
 import signal
 import sys
 import threading
 import time
-import warnings
 
 import pytest
 import threadpoolctl
@@ -164,28 +162,3 @@ def test_closed_generator_restores_threads(found, n_jobs, leave):
         del results
     assert blas_threads() == found
     assert len(begun) < 10
-
-
-# -- forks ----------------------------------------------------------------------------------
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks")
-def test_forked_child_does_not_inherit_the_limit(found):
-    holder, forking = Holder(), multiprocessing.get_context("fork")
-    answer = forking.Queue()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        child = forking.Process(target=answer_of_child, args=(answer,))
-        child.start()
-    assert answer.get(timeout=20) == [{2}, {1}, {2}]
-    child.join()
-    assert set(blas_threads().values()) == {1}
-    holder.end()
-    assert blas_threads() == found
-
-
-def answer_of_child(answer):
-    threads = [blas_threads()]
-    with one_blas_thread():
-        threads.append(blas_threads())
-    answer.put([set(each.values()) for each in [*threads, blas_threads()]])

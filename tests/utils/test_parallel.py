@@ -21,6 +21,9 @@ from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.utils.parallel import Progress, run
 
+# Random walks are no movement.
+pytestmark = pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
+
 SETTINGS = {
     "paper": {"cost": "posture", "max_rate": 2, "consensus": 0},
     "defaults": {},
@@ -32,7 +35,7 @@ SETTINGS = {
 def walks():
     """300 performances, whose fit and warps take several portions."""
     rng = np.random.default_rng(0)
-    return [np.cumsum(rng.standard_normal((n, 5)), axis=0) for n in rng.integers(30, 40, size=300)]
+    return [np.cumsum(rng.standard_normal((n, 3)), axis=0) for n in rng.integers(16, 20, size=300)]
 
 
 def bits(X, **settings):
@@ -59,7 +62,6 @@ CONTEXTS = {
 }
 
 
-@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 @pytest.mark.parametrize(
     ("settings", "name"),
     [
@@ -238,7 +240,7 @@ def test_ctrl_c_ends_a_long_fit(n_jobs):
     )
     try:
         assert process.stdout.readline() == "begin\n"
-        time.sleep(1.5)
+        time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         assert process.stdout.readline() == "unfitted\n"
         assert process.wait(timeout=10) == 0

@@ -95,7 +95,7 @@ def test_synchronized_bodies_are_drawn_for_any_view(view):
 
 
 @pytest.mark.parametrize("reduced", [False, True])
-def test_departures_of_a_raised_arm_mark_its_limbs(union, reduced):
+def test_departures_of_a_raised_arm_mark_its_limbs(reduced):
     odd = BUNCH.data[0].reshape(-1, 15, 3).copy()
     wrist, elbow, shoulder = (BUNCH.skeleton.index_of(f"left_{j}") for j in
                               ("wrist", "elbow", "shoulder"))  # fmt: skip
@@ -109,7 +109,7 @@ def test_departures_of_a_raised_arm_mark_its_limbs(union, reduced):
         make_pipeline(
             view, ASpace(0.95) if reduced else "passthrough", LinearSynchronizer(20), ActionModel()
         ).fit(BUNCH.data)
-        for view in (union, clone(COSINES))
+        for view in (clone(BOTH), clone(COSINES))
     )
     good, bad = (SkeletonDisplay.from_departures(pipe, X, performance=i) for i in (0, 1))
     assert "is accepted" in good.heading
