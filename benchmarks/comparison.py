@@ -1,14 +1,13 @@
 """Whether `compare_groups` keeps its level, and what it finds, beside other tests of curves.
 
     pip install spm1d fdasrsf fdatools
-    python benchmarks/comparison.py DATA_FOLDER [studies] [level] [peers] [nlreg1d] [--studies N]
+    python benchmarks/comparison.py DATA_FOLDER [level] [power] [peers] [nlreg1d] [--studies N]
 
-*Studies* of `make_gait` with 10 or 20 people of two strides, all four signals, and differences that
-it makes. In null studies nothing differs; groups, pairs, or a covariate are drawn at random.
-Signals are scaled for the match and compared in their units, by 399 permutations at 5 %. *Level*
-has null studies alone: of 8 to 30 people, one to four signals, and templates of group A alone; and
-of people drawn from the forces of a muscle (nlreg1d), in groups at random. By 199 permutations.
-*Called* is what the clusters say, if shape and timing together differ. In per cent.
+*Level*: studies in which nothing differs, of 8 to 30 people of `make_gait` with two strides, one to
+four signals, groups, pairs or a covariate drawn at random, and templates of group A alone; and of
+people drawn from the forces of a muscle (nlreg1d), in groups at random. Signals are scaled for the
+match and compared in their units, by 199 permutations at 5 %. *Power*: differences that `make_gait`
+makes between 10 or 20 people of two strides, four signals, by 399 permutations. In per cent.
 
 *Peers*: null strides of 20 people, and what is made on top of them for group B: a warp of at most 2
 or 3 % of the cycle, around 20 % (early) or 70 % (late); a bump of the knee of 5 or 10 degrees; or
@@ -21,9 +20,9 @@ they take one curve a person.
 - nlreg1d: its procedure, with fdasrsf and spm1d. Curves are registered by square-root slopes; T2 of
   registered curve and displacement; if it rejects, t of each at 2.5 %. By random field theory. Each
   of several signals is tested alone, with Bonferroni's correction.
-- fdatools: its t test by 999 permutations after linear normalisation; *registered*: after its
-  registration of all signals by least squares, of curves and of warps at half of the level each.
-  Each of several signals alone, with Bonferroni's correction.
+- fdatools: its t test by 999 permutations after its registration of all signals by least squares,
+  of curves and of warps at half of the level each. Each of several signals alone, with Bonferroni's
+  correction.
 
 *Right*: of the studies in which a difference is found, those in which shape is called if and only
 if it differs, and timing likewise. *Overlap*: intersection over union of the frames that are found,
@@ -34,7 +33,6 @@ Data), beside those that it published. Prints Markdown.
 
 import contextlib
 import io
-import time
 import warnings
 from functools import partial
 
@@ -47,21 +45,14 @@ from sklearn_motionsync import DenseSynchronizer, FrameWise, compare_groups
 from sklearn_motionsync.datasets import make_gait
 
 P, KNEE, LEVEL, PERMUTATIONS = 101, 1, 0.05, 999
-# What differs, and what is compared.
-STUDIES = {
-    "nothing, two groups": ({}, "two"),
-    "nothing, three groups": ({}, "three"),
-    "nothing, paired": ({}, "paired"),
-    "nothing, covariate": ({}, "covariate"),
-    "nothing, covariate within people": ({}, "within"),
-    "timing, 2 %": ({"timing": 2}, "two"),
-    "timing, 3 %": ({"timing": 3}, "two"),
-    "timing, 5 %": ({"timing": 5}, "two"),
-    "shape, 8 degrees": ({"amplitude": 8}, "two"),
-    "shape, 15 degrees": ({"amplitude": 15}, "two"),
-    "both, 3 % and 15 degrees": ({"timing": 3, "amplitude": 15}, "two"),
+MADE = {
+    "nothing": {},
+    "timing, 2 %": {"timing": 2},
+    "timing, 3 %": {"timing": 3},
+    "shape, 8 degrees": {"amplitude": 8},
+    "shape, 15 degrees": {"amplitude": 15},
 }
-ANSWERS = ("joint", "shape", "timing", "linear", "called shape", "called timing")
+ANSWERS = ("joint", "shape", "timing", "linear")
 
 
 def compared(gait, kind, rng):
@@ -83,20 +74,6 @@ def compared(gait, kind, rng):
     return {"covariate": [of[person] for person in gait.person]}
 
 
-def gait_study(seed, n_people, params, kind):
-    """Whether each answer is given, of one study."""
-    warnings.simplefilter("ignore")
-    gait = make_gait(n_people, 2, random_state=seed, **params)
-    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(gait.data)
-    design = compared(gait, kind, np.random.default_rng(seed))
-    found = compare_groups(
-        pipe, gait.data, **design, people=gait.person, n_permutations=399, random_state=seed
-    )
-    differs = found.to_frame()["differs"].tolist()
-    called = set(found.clusters["what"]) if differs[0] else set()
-    return [*differs, "shape" in called, "timing" in called]
-
-
 def null_study(seed):
     """Answers of each design, for a set in which nothing differs."""
     warnings.simplefilter("ignore")
@@ -114,6 +91,16 @@ def null_study(seed):
         found = compare_groups(one if kind == "template of A" else pipe, data, **design)
         rows.append(found.to_frame()["differs"].tolist())
     return rows
+
+
+def power_study(seed, n_people, params):
+    """Whether each answer is given, of one study of two groups that differ."""
+    warnings.simplefilter("ignore")
+    gait = make_gait(n_people, 2, random_state=seed, **params)
+    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(gait.data)
+    options = {"people": gait.person, "n_permutations": 399, "random_state": seed}
+    found = compare_groups(pipe, gait.data, gait.group, **options)
+    return found.to_frame()["differs"].tolist()
 
 
 def null_study_of_forces(seed, curves):
@@ -289,11 +276,6 @@ def fdatools_p(y, n):
     return fdatools.stats.t_test(*fds, n_perm=PERMUTATIONS, random_state=0).pvalue
 
 
-def fdatools_linear(trials, groups, people):
-    y, n = means_of_people(trials, groups, people)
-    return answer(min(fdatools_p(x, n) for x in np.moveaxis(y, 2, 0)) <= LEVEL / y.shape[2])
-
-
 def fdatools_registered(trials, groups, people):
     import fdatools
 
@@ -319,8 +301,7 @@ TESTS = {
     "compare_groups": ours,
     "spm1d": spm1d_linear,
     "nlreg1d": nlreg1d,
-    "fdatools": fdatools_linear,
-    "fdatools, registered": fdatools_registered,
+    "fdatools": fdatools_registered,
 }
 
 
@@ -328,11 +309,9 @@ TESTS = {
 
 
 def peer_study(seed, difference, signals, name):
-    """The answer of a test, with seconds, whether it is right, and overlaps."""
+    """The answer of a test, whether it is right, and overlaps."""
     trials, groups, people, truth = made(seed, 20, difference)
-    begin = time.perf_counter()
     row = TESTS[name]([x[:, signals] for x in trials], groups, people)
-    row["seconds"] = time.perf_counter() - begin
     if row["joint"] and row["shape"] is not None:
         row["right"] = all(row[what] == (truth[what] is not None) for what in truth)
     for what, mask in truth.items():
@@ -345,30 +324,12 @@ def peer_study(seed, difference, signals, name):
 # -- tables -----------------------------------------------------------------------------
 
 
-def share_table(corner, rows, work):
-    """Per cent of the studies in which each answer is given, a row each."""
-    print_head(corner, ANSWERS)
-    for name, function in rows.items():
-        answers = Parallel(2)(delayed(function)(seed) for seed in work)
-        shares = 100 * np.mean(answers, axis=0)
-        print_row(name, [f"{x:.1f}" for x in shares])
-
-
-def study_table(folder, n_studies=300):
-    for n_people in (10, 20):
-        rows = {
-            name: partial(gait_study, n_people=n_people, params=params, kind=kind)
-            for name, (params, kind) in STUDIES.items()
-        }
-        share_table(f"{n_people} people, differs by", rows, range(n_studies))
-
-
 def level_table(folder, n_studies=1000):
     """How often each answer is given where nothing differs."""
     kinds = ["two groups", "three groups", "paired", "covariate", "covariate within people"]
     kinds.append("two groups, template of A alone")
     table = np.loadtxt(folder / "nlreg1d" / "Besier2009-vastus.csv", delimiter=",")
-    print_head(f"nothing differs, {n_studies} studies", ANSWERS[:4])
+    print_head(f"nothing differs, {n_studies} studies", ANSWERS)
     for prefix, names, function in (
         ("", kinds, null_study),
         ("forces, ", kinds[:2] + kinds[3:4], partial(null_study_of_forces, curves=table[:, 1:])),
@@ -378,8 +339,18 @@ def level_table(folder, n_studies=1000):
             print_row(prefix + name, [f"{x:.1f}" for x in shares])
 
 
+def power_table(folder, n_studies=300):
+    """How often each answer is given where groups differ."""
+    print_head("people, they differ by", ANSWERS)
+    for n_people in (10, 20):
+        for name, params in MADE.items():
+            work = (delayed(power_study)(seed, n_people, params) for seed in range(n_studies))
+            shares = 100 * np.mean(Parallel(2)(work), axis=0)
+            print_row(f"{n_people}, {name}", [f"{x:.1f}" for x in shares])
+
+
 def peer_table(folder, n_studies=30):
-    columns = ["joint", "shape", "timing", "right", "overlap: shape", "timing", "seconds"]
+    columns = ["joint", "shape", "timing", "right", "overlap: shape", "timing"]
     for setting, signals in SETTINGS.items():
         for difference in DIFFERENCES:
             print_head(f"{setting}, {difference}", columns)
@@ -394,7 +365,7 @@ def cells_of(found):
     for key in ("joint", "shape", "timing", "right"):
         values = [row[key] for row in found if row.get(key) is not None]
         cells.append(percent(np.mean(values)) if values else "-")
-    for key in ("shape overlap", "timing overlap", "seconds"):
+    for key in ("shape overlap", "timing overlap"):
         values = [row[key] for row in found if key in row]
         cells.append(f"{np.median(values):.2f}" if values else "-")
     return cells
@@ -435,8 +406,8 @@ def nlreg1d_table(folder):
 
 
 TABLES = {
-    "studies": study_table,
     "level": level_table,
+    "power": power_table,
     "peers": peer_table,
     "nlreg1d": nlreg1d_table,
 }

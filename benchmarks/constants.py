@@ -1,6 +1,6 @@
 """What every constant of a fit is worth: switched off, halved and doubled, on five sorts of data.
 
-    python benchmarks/constants.py [--data ../shared/data] [--only _RIDGE ...] [--whole]
+    python benchmarks/constants.py [--data ../shared/data] [--only _RIDGE ...]
 
 `CONSTANTS` lists what the defaults of `DenseSynchronizer` rest on. Prints by how many per cent the
 error grows, in the geometric mean over moments, joints or sets:
@@ -14,9 +14,8 @@ error grows, in the geometric mean over moments, joints or sets:
 The worth of a constant is its largest change of all; those of less than 1 % could as well have
 another value, or go. "No effect" are those that nothing here depends on, to the last bit. To be
 quick every column but the second is thinned: two templates, and every second trial, an action;
-every second unseen action; two random sets. ``--whole`` takes all: changes of pairs and of unseen
-moments differ from the thinned ones by about 1.5 (root mean square of ten switches), those of warps
-by 2.5. Takes five minutes on two free cores. Prints Markdown.
+every second unseen action; two random sets. So a change of pairs, of unseen moments or of warps by
+2 % may be chance. Takes five minutes on two free cores. Prints Markdown.
 """
 
 import os
@@ -37,13 +36,13 @@ from typing import NamedTuple
 from unittest.mock import patch
 
 import numpy as np
-from accuracy import known_warps
 from harness import (
     DATA,
     EVENTS,
     P,
     figures,
     geometric_means,
+    known_warps,
     moment,
     on_time_line,
     print_head,
@@ -71,8 +70,6 @@ class Constant(NamedTuple):
         The value that takes its effect away; None if there is none, or twice the value does.
     half, double : object, default=None
         By default half the value and twice the value; whole numbers stay whole.
-    index : int, default=None
-        Which number of a tuple; None for all.
     also : tuple of str, default=()
         Other modules that import it by its name.
     """
@@ -83,12 +80,10 @@ class Constant(NamedTuple):
     off: object = None
     half: object = None
     double: object = None
-    index: int | None = None
     also: tuple = ()
 
     def __str__(self):
-        place = "" if self.index is None else f"[{self.index}]"
-        return f"{self.module.rsplit('.', maxsplit=1)[-1]}.{self.name}{place}"
+        return f"{self.module.rsplit('.', maxsplit=1)[-1]}.{self.name}"
 
     @property
     def modules(self):
@@ -101,8 +96,7 @@ class Constant(NamedTuple):
         """What it is now."""
         if self.module == PARAMETERS:
             return defaults()[self.name]
-        value = getattr(self.modules[0], self.name)
-        return value if self.index is None else value[self.index]
+        return getattr(self.modules[0], self.name)
 
     def tried(self):
         """{"off", "half", "double": value} of what is tried."""
@@ -120,10 +114,6 @@ class Constant(NamedTuple):
             with patch.dict(defaults(), {self.name: value}):
                 yield
             return
-        if self.index is not None:
-            whole = list(getattr(self.modules[0], self.name))
-            whole[self.index] = value
-            value = tuple(whole)
         with ExitStack() as stack:
             for module in self.modules:
                 stack.enter_context(patch.object(module, self.name, value))
@@ -131,9 +121,7 @@ class Constant(NamedTuple):
 
 
 def scaled(value, factor):
-    """A number, or each of a tuple, times a factor; a whole number stays whole, and 1 at least."""
-    if isinstance(value, tuple):
-        return tuple(scaled(each, factor) for each in value)
+    """A number times a factor; a whole number stays whole, and 1 at least."""
     return max(1, int(value * factor)) if isinstance(value, int) else value * factor
 
 
@@ -212,15 +200,8 @@ NOISE, SIGNALS = (0.005, 0.05, 0.2), (16, 2, 1)
 RATES = (0.5, 2.0), (0.75, 1.35)
 
 
-def thinned(n, whole):
-    """Indices: all of n, or every second one."""
-    return np.arange(0, n, 1 if whole else 2)
-
-
-def templates_of(one, whole):
-    """The templates of an action: a dozen at most, or two of them that show all of its moments."""
-    if whole:
-        return one.patterns
+def templates_of(one):
+    """Two templates of an action that show all of its moments."""
     shown = np.isfinite([at[one.patterns] for at in one.moments.values()]).all(axis=0)
     able = one.patterns[shown]
     return able[[len(able) // 3, 2 * len(able) // 3]]
@@ -236,12 +217,12 @@ def errors_of_pairs(one, template, others):
         yield event, np.abs(landed - at[others])
 
 
-def pairs(people, whole):
+def pairs(people):
     """Mean errors of moments from templates to trials."""
     errors: dict = {}
     for one in people:
-        others = thinned(len(one.X), whole)
-        for template in templates_of(one, whole):
+        others = np.arange(0, len(one.X), 2)
+        for template in templates_of(one):
             for event, misses in errors_of_pairs(one, template, others):
                 errors.setdefault((one.name, event), []).extend(misses[np.isfinite(misses)])
     return {event: np.mean(misses) for event, misses in errors.items()}
@@ -299,13 +280,12 @@ def forces(sets):
     return spread
 
 
-def make_warps(whole):
+def make_warps():
     """{(noise, signals): sets with their true warps}."""
-    kinds = list(product(RATES, range(4))) if whole else list(zip(RATES, range(2), strict=True))
     return {
         (noise, signals): [
             known_warps(seed, lowest, highest, noise, n_features=signals)
-            for (lowest, highest), seed in kinds
+            for seed, (lowest, highest) in enumerate(RATES)
         ]
         for noise, signals in product(NOISE, SIGNALS)
     }
@@ -321,17 +301,16 @@ def missed_warps(cells):
     return {cell: np.mean([error(X, truth) for X, truth in sets]) for cell, sets in cells.items()}
 
 
-def columns(folder, whole=False):
+def columns(folder):
     """Functions, by the names of the columns, that give the errors of the package as it is."""
-    people = read_people(folder, [event for event in EVENTS if event.peers])
-    unseen = read_unseen(folder / "events44" / "events44.npz")
-    unseen = [unseen[i] for i in thinned(len(unseen), whole)]
+    people = read_people(folder, [event for event in EVENTS if event.chosen])
+    unseen = read_unseen(folder / "events44" / "events44.npz")[::2]
     return {
-        "pairs": partial(pairs, people, whole),
+        "pairs": partial(pairs, people),
         "one clock": partial(on_one_clock, [(one.name, one.X, one.moments) for one in people]),
         "unseen": partial(on_one_clock, unseen),
         "forces": partial(forces, read_landmarks(folder / "nlreg1d")),
-        "warps": partial(missed_warps, make_warps(whole)),
+        "warps": partial(missed_warps, make_warps()),
     }
 
 
@@ -348,10 +327,10 @@ def judged(of_columns):
     )
 
 
-def judge_all(tasks, folder, whole):
+def judge_all(tasks, folder):
     """The errors of every column for each task: a constant and a value, or None."""
     warnings.simplefilter("ignore")
-    of_columns, errors = columns(folder, whole), []
+    of_columns, errors = columns(folder), []
     for constant, value in tasks:
         start = time.process_time()
         if constant is None:
@@ -364,13 +343,13 @@ def judge_all(tasks, folder, whole):
     return errors
 
 
-def changes_of(constants, folder, whole=False, n_jobs=2):
+def changes_of(constants, folder, n_jobs=2):
     """{constant: {label: changes (n_columns,) in per cent}}."""
     tried = [(one, *each) for one in constants for each in one.tried().items()]
     tasks = [(None, None), *((one, value) for one, _, value in tried)]
     # A process reads the data once.
     shares = [tasks[i::n_jobs] for i in range(n_jobs)]
-    done = Parallel(n_jobs)(delayed(judge_all)(share, folder, whole) for share in shares)
+    done = Parallel(n_jobs)(delayed(judge_all)(share, folder) for share in shares)
     errors = np.empty((len(tasks), len(done[0][0])))
     for i, share in enumerate(done):
         errors[i::n_jobs] = share
@@ -409,10 +388,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--only", nargs="+", help="names of some constants; by default all")
-    parser.add_argument("--whole", action="store_true", help="columns that are not thinned")
     options = parser.parse_args()
     chosen = [one for one in CONSTANTS if options.only is None or one.name in options.only]
-    changes = changes_of(chosen, options.data, options.whole)
+    changes = changes_of(chosen, options.data)
     print_changes(changes, ["pairs", "one clock", "unseen", "forces", "warps"])
 
 

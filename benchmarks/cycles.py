@@ -1,22 +1,17 @@
 """Cycles of real people: their period against foot geometry, and where a recording repeats.
 
-    python benchmarks/cycles.py DATA_FOLDER [periods] [single] [several] [lengths] [standing]
+    python benchmarks/cycles.py DATA_FOLDER [periods] [single] [several] [standing]
         [joined] [gestures]
 
 *Periods*: a foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such
 a maximum stands out by 0.3 of the whole swing. A step is the time from one strike to the next, of
 either foot. A period is held against twice the median step: the jogs begin from standing, and their
-first stride is longer. Deviations of foot strikes are those of their phases from the mean phase of
-the foot, in hundredths of a cycle, within takes and within all takes of an action. Takes are cut by
-what was learnt from other actors or, where there is one actor, from the other takes. *Single*
-actions are not to be cyclic.
+first stride is longer. *Single* actions are not to be cyclic.
 
 *Several* cycles fit where every second or fourth repetition differs: exercises of UI-PRMD, chained
 from repetitions of one person, some of them done wrong. A period is right within 10 % of the mean
 repetition of its stretch, or of two or four where one in so many is wrong. Elsewhere right periods
-that are warned of are false alarms. *Lengths*: a cut is right if it holds 0.7 to 1.3 repetitions,
-from foot strike to foot strike or along a chain. In shallow chains the last but one repetitions
-have a part of their size, and the path of the phase may stand still through them.
+that are warned of are false alarms.
 
 *Standing*: walks and jogs have so many times as much standing around them, half of it before, half
 behind. ``freeze`` repeats the first and the last frame. ``sway`` turns within half a second to a
@@ -28,26 +23,23 @@ take is found if more than half of a stretch lies within its label. Prints Markd
 
 import copy
 import functools
-import warnings
 from pathlib import Path
 
 import numpy as np
 from harness import command_line, print_head, print_row, run_tables
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
-from sklearn.model_selection import LeaveOneGroupOut
-from sklearn_motionsync import CycleSegmenter, DirectionCosines
-from sklearn_motionsync.datasets import load_performances, make_gait
+from sklearn_motionsync import CycleSegmenter
+from sklearn_motionsync.datasets import load_performances
 
 CYCLIC = {"cmu07_walk": "walk", "hdm05": "jogLeftCircle4StepsRstart"}
-ONE_CYCLE = "sneak2StepsLStart"
 SINGLE = {
     "hdm05": (
         "depositFloorR",
         "grabHighR",
         "hopBothLegs1hops",
         "elbowToKnee1RepsLelbowStart",
-        ONE_CYCLE,
+        "sneak2StepsLStart",
     ),
     "utkinect": ("sitDown", "standUp", "pickUp", "throw", "push", "pull"),
 }
@@ -55,10 +47,6 @@ SINGLE = {
 SMOOTHING, APART = 0.02, 0.3
 # Of so many repetitions in a chain every so many is one done wrong; 0 is none.
 CHAIN, EVERY, DRAWS = 12, (0, 2, 4), 3
-# Sizes of the shallow repetitions of a chain, and how many there are before the last one.
-SHALLOW, N_SHALLOW = (1, 0.4, 0.2), 2
-# A cut holds one repetition if it holds so much more or less of one.
-RIGHT = 0.3
 GESTURES = ("waveHands", "clapHands")
 # Seconds of the turn to a posture of standing, and of the filter of the sway; sway and noise in m.
 TURN, SLOW, SWAY, NOISE = 0.5, 0.25, 0.01, 0.001
@@ -104,64 +92,13 @@ def foot_strikes(positions, skeleton, frame_rate):
     return strikes
 
 
-def references(strikes):
-    """Twice the median step, and the mean stride, in frames."""
-    steps = np.diff(np.sort(np.concatenate(strikes)))
-    return 2 * np.median(steps), np.concatenate([np.diff(s) for s in strikes]).mean()
-
-
-def deviations(phases, strikes):
-    """Mean deviations of the phases of foot strikes, in hundredths of a cycle: within takes, all.
-
-    Parameters
-    ----------
-    phases : list of ndarray (n_frames_i,)
-    strikes : list of [left, right]
-    """
-    found = []
-    for p, of_take in zip(phases, strikes, strict=True):
-        at = [np.interp(s, np.arange(len(p)), p) for s in of_take]
-        found.append([k[np.isfinite(k)] for k in at])
-    within = [around(foot) for of_take in found for foot in of_take if len(foot) > 1]
-    whole = [around(np.concatenate(of_foot)) for of_foot in zip(*found, strict=True)]
-    return [100 * np.abs(np.concatenate(d)).mean() for d in (within, whole)]
-
-
-def around(phases):
-    """Deviations from the mean direction of phases."""
-    mean = np.angle(np.exp(2j * np.pi * phases).mean()) / (2 * np.pi)
-    return (phases - mean + 0.5) % 1 - 0.5
-
-
-def phases_of_others(bunch, **params):
-    """Phases of every take, by a segmenter that knows the takes of other people only."""
-    groups = bunch.actor if len(set(bunch.actor)) > 1 else bunch.take
-    out = [None] * len(bunch.data)
-    for train, test in LeaveOneGroupOut().split(bunch.data, groups=groups):
-        # Which foot is farther ahead depends on who is left out.
-        segmenter = CycleSegmenter(bunch.skeleton, start="right", **params)
-        segmenter.fit([bunch.data[i] for i in train])
-        for i, phases in zip(test, segmenter.phases([bunch.data[i] for i in test]), strict=True):
-            out[i] = phases
-    return out
-
-
-def limbs(bunch):
-    """Single limbs of takes, in directions, and the periods of the whole bodies."""
-    periods = CycleSegmenter(bunch.skeleton).report(bunch.data)["period"]
-    cosines = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-    for x, period in zip(cosines, periods, strict=True):
-        for k in range(0, x.shape[1] - 2, 3):
-            yield x[:, k : k + 3], period
+def period_of_strikes(x, skeleton, frame_rate):
+    """Twice the median step, in frames."""
+    return 2 * np.median(np.diff(np.sort(np.concatenate(foot_strikes(x, skeleton, frame_rate)))))
 
 
 def chains(folder, every):
     """Repetitions of a person and an exercise, one after the other, and where each begins."""
-    for chain in _repetitions(folder, every):
-        yield np.concatenate(chain), np.cumsum([0, *map(len, chain)])
-
-
-def _repetitions(folder, every):
     file = np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz")
     positions = file["positions"] - file["positions"].mean(axis=1, keepdims=True)
     parts = np.split(positions.reshape(len(positions), -1), file["offsets"][1:-1])
@@ -175,17 +112,8 @@ def _repetitions(folder, every):
             for _ in range(DRAWS):
                 good, bad = (np.resize(rng.permutation(k), CHAIN) for k in (right, wrong))
                 chosen = [bad[k] if every and k % every == 0 else good[k] for k in range(CHAIN)]
-                yield [parts[k] for k in chosen]
-
-
-def shallow_chains(folder, size):
-    """Chains whose last but one repetitions are shallow, and the frames at which each begins."""
-    for chain in _repetitions(folder, 0):
-        for k in range(CHAIN - 1 - N_SHALLOW, CHAIN - 1):
-            x = chain[k]
-            line = np.linspace(x[0], x[-1], len(x))
-            chain[k] = line + size * (x - line)
-        yield np.concatenate(chain), np.cumsum([0, *map(len, chain)])
+                chain = [parts[k] for k in chosen]
+                yield np.concatenate(chain), np.cumsum([0, *map(len, chain)])
 
 
 def several_fit(pairs, segmenter=None, every=0):
@@ -216,60 +144,9 @@ def warnings_of(folder):
         segmenter = CycleSegmenter(bunch.skeleton)
         periods = segmenter.report(bunch.data)["period"]
         yield names[1], several_fit(zip(bunch.data, periods, strict=True), segmenter)
-        yield "  single limbs", several_fit(limbs(bunch))
     for every in EVERY:
         name = f"exercises, 1 of {every} wrong" if every else "exercises, none wrong"
         yield name, several_fit(chains(folder, every), every=every)
-
-
-def lengths(triples):
-    """Shares of the period that right cuts have, and counts of takes: right, warned; wrong, warned.
-
-    Parameters
-    ----------
-    triples : iterable of (take, frames at which its repetitions begin, segmenter)
-    """
-    shares, counts = [], np.zeros((2, 2), dtype=int)
-    for take, begins, segmenter in triples:
-        (row,) = segmenter.report([take]).itertuples()
-        if not row.cyclic or len(row.periods) > 1 or len(begins) < 2:
-            continue
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            table = segmenter.fit([take]).segment([take])[1]
-        first, last = table["start"].to_numpy(), table["stop"].to_numpy() - 1
-        # Before the first repetition that is known, and after the last, at the mean pace.
-        begins = [begins[0] - row.period, *begins, begins[-1] + row.period]
-        held = np.subtract(*(np.interp(k, begins, np.arange(len(begins))) for k in (last, first)))
-        inside = (first >= begins[0]) & (last <= begins[-1])
-        right = np.abs(held - 1) < RIGHT
-        shares += ((last - first) / row.period)[inside & right].tolist()
-        counts[int(not right[inside].all())] += [1, any("whole cycles" in str(w) for w in caught)]
-    return shares, counts.ravel().tolist()
-
-
-def warnings_of_lengths(folder, seeds=8, sizes=SHALLOW):
-    """Names of sets of takes, and what `lengths` gives."""
-    gait = [make_gait(6, n_cycles=6, takes=True, random_state=seed) for seed in range(seeds)]
-    takes = [(x, np.linspace(0, len(x), 7)) for bunch in gait for x in bunch.data]
-    yield "make_gait", lengths((x, begins, CycleSegmenter(start=0)) for x, begins in takes)
-    for names in CYCLIC.items():
-        bunch = read(folder, *names)
-        pairs = list(zip(bunch.data, bunch.frame_rate, strict=True))
-        yield (
-            names[1],
-            lengths(
-                (x, begins, CycleSegmenter(bunch.skeleton, start=side))
-                for x, rate in pairs
-                for side, begins in zip(
-                    ("left", "right"), foot_strikes(x, bunch.skeleton, rate), strict=True
-                )
-            ),
-        )
-    for size in sizes:
-        pairs = shallow_chains(folder, size)
-        name = "exercises" if size == 1 else f"exercises, {N_SHALLOW} of size {size}"
-        yield name, lengths((x, begins, CycleSegmenter()) for x, begins in pairs)
 
 
 # -- standing, and other actions --------------------------------------------------------
@@ -340,7 +217,7 @@ def walks(folder):
                 "pose": pose.reshape(-1, 3),
                 "unit": 100.0 if archive == "cmu07_walk" else 1.0,
                 "group": group,
-                "period": references(foot_strikes(x, bunch.skeleton, rate))[0],
+                "period": period_of_strikes(x, bunch.skeleton, rate),
             }
 
 
@@ -466,16 +343,10 @@ def period_table(folder):
         bunch = read(folder, archive, label)
         report = CycleSegmenter(bunch.skeleton).report(bunch.data)
         print_head(label, ["period", "cycles", "error, %"])
-        strikes = []
         pairs = zip(bunch.data, bunch.frame_rate, report.itertuples(), strict=True)
         for k, (x, rate, row) in enumerate(pairs):
-            strikes.append(foot_strikes(x, bunch.skeleton, rate))
-            error = 100 * (row.period / references(strikes[-1])[0] - 1)
+            error = 100 * (row.period / period_of_strikes(x, bunch.skeleton, rate) - 1)
             print_row(k, [f"{row.period:.1f}", f"{row.n_cycles:.2f}", f"{error:.1f}"])
-        print_head("deviations of foot strikes", ["within takes", "all takes"])
-        for name, refine in (("constant period", False), ("circular matching", True)):
-            found = deviations(phases_of_others(bunch, refine=refine), strikes)
-            print_row(name, [f"{x:.2f}" for x in found])
 
 
 def single_table(folder):
@@ -495,15 +366,6 @@ def several_table(folder):
     print_head("several cycles fit", columns)
     for name, counts in warnings_of(folder):
         print_row(name, map(str, counts))
-
-
-def length_table(folder):
-    columns = ["right cuts", "shares of the period", "takes right, warned of", "with wrong cuts"]
-    print_head("lengths of cycles", columns)
-    for name, (shares, (right, told, wrong, told_wrong)) in warnings_of_lengths(folder):
-        ends = f"{min(shares):.2f} to {max(shares):.2f}"
-        of = [f"{right}, {told}", f"{wrong}, {told_wrong}"]
-        print_row(name, [str(len(shares)), ends, *of])
 
 
 def standing_table(folder):
@@ -537,7 +399,6 @@ TABLES = {
     "periods": period_table,
     "single": single_table,
     "several": several_table,
-    "lengths": length_table,
     "standing": standing_table,
     "joined": joined_table,
     "gestures": gesture_table,

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from exercises import LANDMARKS, OTHER_SIDE
+from exercises import read_positions
 from harness import command_line, percent, print_head, print_row, run_tables
 from scipy.spatial.transform import Rotation
 from sklearn.pipeline import make_pipeline
@@ -30,7 +30,6 @@ from sklearn_motionsync import (
     Match,
     Skeleton,
     find_departures,
-    mirror,
 )
 from sklearn_motionsync.datasets import load_performances
 
@@ -170,18 +169,11 @@ def classes_of_hdm05(folder):
 
 
 def exercises_of_uiprmd(folder, wanted):
-    with np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz") as file:
-        z = dict(file)
-    markers = np.split(z["positions"].astype(float), z["offsets"][1:-1])
-    skeleton = Skeleton(z["joints"].tolist(), z["parents"].tolist(), landmarks=LANDMARKS, up="z")
+    markers, table, skeleton = read_positions(folder)
     for name in wanted:
-        rows = np.flatnonzero((z["label"] == name) & z["correct"])
-        data = as_bodies([markers[i].reshape(len(markers[i]), -1) for i in rows], skeleton)
-        turned = [k for k, i in enumerate(rows) if z["actor"][i] in OTHER_SIDE.get(name, ())]
-        if turned:
-            for k, x in zip(turned, mirror([data[k] for k in turned], BODY), strict=True):
-                data[k] = np.asarray(x)
-        yield Trials(name, data, z["actor"][rows], z["take"][rows])
+        rows = table[(table["label"] == name) & table["correct"]]
+        data = as_bodies([markers[i] for i in rows.index], skeleton)
+        yield Trials(name, data, rows["actor"].to_numpy(), rows["take"].to_numpy())
 
 
 def as_bodies(data, skeleton):

@@ -14,6 +14,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from harness import command_line, print_head, print_row, run_tables
 from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
@@ -55,22 +56,31 @@ OTHER_SIDE = {
 }
 
 
+def read_positions(folder):
+    """Markers, the table of trials, and the skeleton; those of the other side are mirrored."""
+    with np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz") as file:
+        archive = dict(file)
+    skeleton = Skeleton(
+        archive["joints"].tolist(), archive["parents"].tolist(), landmarks=LANDMARKS, up="z"
+    )
+    x = archive["positions"].reshape(len(archive["positions"]), -1).astype(float)
+    trials = np.split(x, archive["offsets"][1:-1])
+    columns = ("label", "actor", "correct", "take")
+    table = pd.DataFrame({name: archive[name] for name in columns})
+    pairs = zip(table["label"], table["actor"], strict=True)
+    other = [i for i, (name, actor) in enumerate(pairs) if actor in OTHER_SIDE.get(name, ())]
+    for i, turned in zip(other, mirror([trials[i] for i in other], skeleton), strict=True):
+        trials[i] = np.asarray(turned)
+    return trials, table, skeleton
+
+
 def read_exercises(folder):
     """Name, postures, people, whether it is right, and number of the trial, of each exercise."""
-    with np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz") as file:
-        joints, parents = file["joints"].tolist(), file["parents"].tolist()
-        skeleton = Skeleton(joints, parents, landmarks=LANDMARKS, up="z")
-        x = file["positions"].reshape(len(file["positions"]), -1).astype(float)
-        trials = np.split(x, file["offsets"][1:-1])
-        pairs = zip(file["label"], file["actor"], strict=True)
-        other = [i for i, (name, actor) in enumerate(pairs) if actor in OTHER_SIDE.get(name, ())]
-        for i, turned in zip(other, mirror([trials[i] for i in other], skeleton), strict=True):
-            trials[i] = np.asarray(turned)
-        trials = DirectionCosines(skeleton).fit_transform(trials)
-        columns = [file[name] for name in ("actor", "correct", "take")]
-        for name in np.unique(file["label"]):
-            own = np.flatnonzero(file["label"] == name)
-            yield name, [trials[i] for i in own], *(column[own] for column in columns)
+    trials, table, skeleton = read_positions(folder)
+    trials = DirectionCosines(skeleton).fit_transform(trials)
+    for name, rows in table.groupby("label"):
+        columns = [rows[column].to_numpy() for column in ("actor", "correct", "take")]
+        yield name, [trials[i] for i in rows.index], *columns
 
 
 # -- right or wrong ---------------------------------------------------------------------
@@ -167,9 +177,6 @@ def wrong_sides(clips, names):
                 shares.setdefault(name, []).extend(accepted if name == "right" else ~accepted)
         cells = [f"{100 * np.mean(of_kind):.0f}" for of_kind in shares.values()]
         print_row(f"`{action}`", [*cells, ", ".join(sorted(found)) or "none"])
-
-
-# -- few and many -------------------------------------------------------------------------
 
 
 def sides(folder):

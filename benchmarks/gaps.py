@@ -2,7 +2,7 @@
 
     python benchmarks/gaps.py DATA_FOLDER [--draws 1] [--patterns 4]
 
-Gaps are cut into the joint positions of the clips that peers were measured on (harness.py). The
+Gaps are cut into the joint positions of the clips that constants were chosen on (harness.py). The
 true moments come from the positions without gaps. Three kinds:
 
 - limb: an arm or a leg is hidden for a second in 30 % of the clips, for half of a shorter clip;
@@ -10,8 +10,8 @@ true moments come from the positions without gaps. Three kinds:
 - frames: a tenth of all frames are gone, in runs of about a tenth of a second.
 
 Directions of limbs of which an end is hidden are NaN. They are matched as they are, or filled
-first: positions by Akima's polynomials (`io.fill_gaps`, held beyond what was seen), directions by
-cubic splines over time, or by the mean of each. Figures are geometric means over the events of mean
+first: positions by Akima's polynomials (`io.fill_gaps`, held beyond what was seen), or directions
+by the mean of each. Figures are geometric means over the events of mean
 and median errors, over those without gaps. A gain or a loss of 3 % may be chance.
 """
 
@@ -32,12 +32,11 @@ from harness import (
     read_actions,
     show_pair,
 )
-from scipy.interpolate import CubicSpline
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.io import fill_gaps
 
 KINDS = ("limb", "joints", "frames")
-JUDGED = [event for event in EVENTS if event.peers]
+JUDGED = [event for event in EVENTS if event.chosen]
 FRAME_RATE = {"hdm05": 120, "utkinect": 30}
 LIMBS = {
     "hdm05": (
@@ -104,32 +103,14 @@ def by_fill_gaps(cosines, action, positions):
     return to_cosines(action, filled)
 
 
-def by_splines(cosines, action, positions):
-    return by_mean([along_time(x) for x in cosines], action, positions)
-
-
-def along_time(x):
-    """Cubic splines through what was seen, held beyond; a feature never seen stays NaN."""
-    x, frames = x.copy(), np.arange(len(x))
-    for column in x.T:
-        seen = frames[np.isfinite(column)]
-        if 3 <= len(seen) < len(column):
-            spline = CubicSpline(seen, column[seen])
-            hidden = np.isnan(column)
-            column[hidden] = spline(np.clip(frames[hidden], seen[0], seen[-1]))
-    return x
-
-
 def by_mean(cosines, action, positions):
     mean = np.nanmean(np.concatenate(cosines), axis=0)
     return [np.where(np.isnan(x), mean, x) for x in cosines]
 
 
-SPACES = "cosines", "aSpace"
 WAYS = {
     "as they are": as_they_are,
     "fill_gaps": by_fill_gaps,
-    "splines": by_splines,
     "mean": by_mean,
 }
 
@@ -150,19 +131,17 @@ def dense(X, patterns):
 # -- the table --------------------------------------------------------------------------------
 
 
-def compare(people, actions, kind, seed, ways=WAYS, spaces=SPACES):
-    """{(way, space): geometric means} of all actions, with gaps of a kind."""
+def compare(people, actions, kind, seed, ways=WAYS):
+    """{way: geometric means} of all actions, with gaps of a kind."""
     found: dict = {}
     for i, (one, action) in enumerate(zip(people, actions, strict=True)):
         positions = hide(action, kind, [seed, i]) if kind else action.data
         cosines = to_cosines(action, positions)
         for name, way in ways.items():
             X = way(cosines, action, positions)
-            for space in spaces:
-                points = ASpace().fit_transform(X) if space == "aSpace" else X
-                errors = Judged(one, dense(points, one.patterns)).errors()
-                found.setdefault((name, space), {}).update(figures(errors))
-    return {key: geometric_means(of_events) for key, of_events in found.items()}
+            errors = Judged(one, dense(X, one.patterns)).errors()
+            found.setdefault(name, {}).update(figures(errors))
+    return {name: geometric_means(of_events) for name, of_events in found.items()}
 
 
 def main():
@@ -173,15 +152,14 @@ def main():
     warnings.simplefilter("ignore")
     actions = read_actions(options.folder, JUDGED)
     people = [People(action, options.patterns) for action in actions]
-    whole = compare(people, actions, None, 0, {"as they are": as_they_are})
+    whole = compare(people, actions, None, 0, {"as they are": as_they_are})["as they are"]
     for kind in KINDS:
         runs_of = [compare(people, actions, kind, seed) for seed in range(options.draws)]
         print_head(f"{kind}, errors over those without gaps", ["mean / median", "spread of draws"])
-        for name, space in runs_of[0]:
-            base = whole["as they are", space]
-            ratios = np.array([found[name, space] / base for found in runs_of])
+        for name in runs_of[0]:
+            ratios = np.array([found[name] / whole for found in runs_of])
             cells = [show_pair(ratios.mean(axis=0)), show_pair(np.ptp(ratios, axis=0))]
-            print_row(f"{name}, {space}", cells)
+            print_row(name, cells)
 
 
 if __name__ == "__main__":

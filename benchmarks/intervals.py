@@ -1,6 +1,6 @@
 """How sure a warp is: the coverage of `Match.interval`, and whom `Match.doubtful` names.
 
-    python benchmarks/intervals.py DATA_FOLDER [people] [doubts] [known-warps]
+    python benchmarks/intervals.py DATA_FOLDER [people] [doubts]
 
 *People*: the key moments of harness.py, on people that had no part in the fit; the moment of the
 template is to lie inside the interval of each clip. *Doubts*: trials that are wrong (repeated, cut
@@ -11,17 +11,11 @@ import warnings
 from functools import partial
 
 import numpy as np
-from accuracy import CELLS, known_warps
 from harness import P, command_line, print_head, read_people, run_tables
 from joblib import Parallel, delayed
 from scipy.stats import spearmanr
 from sklearn.model_selection import GroupKFold
-from sklearn_motionsync import (
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-)
-from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync import ASpace, DenseSynchronizer
 
 NOMINAL = (0.8, 0.9, 0.95)
 FIGURES = ("mean error", "half-width of 90 %", "80 %", "90 %", "95 %")
@@ -152,61 +146,6 @@ def shown(shares):
     return " | ".join("-" if np.isnan(share) else f"{share:.0%}" for share in shares)
 
 
-# -- known warps ------------------------------------------------------------------------
-
-
-def held(match, truth, rows):
-    """Coverages, mean error and half-width of some rows, without the first and last frames."""
-    some = slice(3, -3)
-    true, out = truth[rows][:, some], []
-    for nominal in NOMINAL:
-        low, high = (bound[rows][:, some] for bound in match.interval(nominal))
-        out.append(((low - 1e-9 <= true) & (true <= high + 1e-9)).mean())
-    low, high = match.interval(0.9)
-    width = (high - low)[rows].mean() / 2
-    return [
-        np.abs(match.times[rows] - truth[rows]).mean(),
-        width,
-        match.doubtful[rows].mean(),
-        *out,
-    ]
-
-
-def known_table(folder, seeds=range(6)):
-    print_head("known warps", ["refined", *FIGURES])
-    for n_features in (1, 4, 16):
-        for low, high, noise in CELLS:
-            rows, refined = [], []
-            for seed in seeds:
-                X, truth = known_warps(seed, low, high, noise, n_features=n_features)
-                sync = DenseSynchronizer(P, pattern=0).fit(X)
-                rows.append(held(sync.match(X), truth, slice(1, None)))
-                refined.append(sync.refines_)
-            name = f"{n_features} features, rates {low}-{high}, noise {noise:.1%}"
-            print(f"| {name} | {np.mean(refined):.0%} | {cells(np.mean(rows, axis=0), 2)} |")
-    for noise in (0.002, 0.005, 0.01, 0.02, 0.05):
-        rows, refined = [], []
-        for seed in seeds:
-            bunch = make_bending(20, noise=noise, random_state=seed)
-            X = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
-            sync = DenseSynchronizer(P).fit(X)
-            others = np.delete(np.arange(20), sync.pattern_index_)
-            truth = warps_of_phases(bunch.times, sync.pattern_index_)
-            rows.append(held(sync.match(X), truth, others))
-            refined.append(sync.refines_)
-        name = f"`make_bending(noise={noise})`"
-        print(f"| {name} | {np.mean(refined):.0%} | {cells(np.mean(rows, axis=0), 2)} |")
-    print(flush=True)
-
-
-def warps_of_phases(phases, pattern):
-    """When all trials show what one of them does, of the phase of each frame of each."""
-    clocks = [np.linspace(0, P - 1, len(phase)) for phase in phases]
-    at = np.interp(np.arange(P), clocks[pattern], phases[pattern])
-    return np.array([np.interp(at, *pair) for pair in zip(phases, clocks, strict=True)])
-
-
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    tables = {"people": people_table, "doubts": doubts_table, "known-warps": known_table}
-    run_tables(tables, command_line(__doc__))
+    run_tables({"people": people_table, "doubts": doubts_table}, command_line(__doc__))

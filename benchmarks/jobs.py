@@ -30,6 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 import sklearn_motionsync
+from harness import DATA, P, known_warps
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -53,16 +54,10 @@ from sklearn_motionsync import (
     write_report,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
-from sklearn_motionsync.display import (
-    ActionModelDisplay,
-    SkeletonDisplay,
-    SynchronizationDisplay,
-)
+from sklearn_motionsync.display import SynchronizationDisplay
 from sklearn_motionsync.io import read_motion
 
 ROOT = Path(__file__).resolve().parents[1]
-DATA = ROOT.parent / "shared" / "data"
-P = 100
 
 # -- made data --------------------------------------------------------------------------
 
@@ -72,49 +67,6 @@ def random_walks(n=40, n_frames=P, n_features=16, seed=0):
     rng = np.random.default_rng(seed)
     X = np.cumsum(rng.standard_normal((n, n_frames, n_features)), axis=1)
     return X - X.mean(axis=(0, 1))
-
-
-def warped_copies(n=40, n_features=16, noise=0.02, seed=1000):
-    """Copies of one smooth movement under strong warps, of 85 to 115 frames, with gain and noise.
-
-    No copy is further than 24 of 100 frames from the first.
-    """
-    rng, grid = np.random.default_rng(seed), np.linspace(0, 1, 2001)
-    frequency = rng.uniform(0.5, 4.0, size=(5, n_features))
-    phase = rng.uniform(0, 2 * np.pi, size=(5, n_features))
-    size = rng.uniform(0.3, 1.0, size=(5, n_features))
-
-    def movement(at):
-        return (size * np.sin(2 * np.pi * frequency * at[:, None, None] + phase)).sum(axis=1)
-
-    warps = []
-    while len(warps) < n:
-        warp = _strong_warp(rng, grid)
-        if warps:
-            on_first = np.interp(np.interp(grid, grid, warps[0]), warp, grid)
-            if np.abs(on_first - grid).max() * (P - 1) > 24:
-                continue
-        warps.append(warp)
-    lengths, spread, copies = rng.integers(85, 116, size=n), movement(grid).std(axis=0), []
-    for warp, length in zip(warps, lengths, strict=True):
-        x = movement(np.interp(np.linspace(0, 1, length), grid, warp))
-        x = x * (1 + 0.05 * rng.standard_normal(n_features))
-        copies.append(x + noise * spread * rng.standard_normal(x.shape))
-    return copies
-
-
-def _strong_warp(rng, grid):
-    """A warp of [0, 1] on a grid, with rates between a half and two."""
-    while True:
-        log_rate = sum(
-            0.6 * rng.standard_normal() / k * np.cos(np.pi * k * grid + rng.uniform(0, 2 * np.pi))
-            for k in (1, 2, 3)
-        )
-        rate = np.exp(log_rate)
-        warp = np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2)])
-        rate *= (len(grid) - 1) / warp[-1]
-        if rate.min() >= 0.5 and rate.max() <= 2:
-            return warp / warp[-1]
 
 
 def warped_sines(n, seed=0, movement=0, n_features=16):
@@ -208,15 +160,6 @@ class Data:
         return self._points("depositFloorR")
 
     @cached_property
-    def many_hops(self):
-        """100 performances: hops again and again, each with a random walk of its own."""
-        rng, X = np.random.default_rng(3), []
-        for i in range(100):
-            x = self.hops[i % len(self.hops)]
-            X.append(x + 0.02 * rng.standard_normal(x.shape).cumsum(axis=0) / np.sqrt(50))
-        return X
-
-    @cached_property
     def simulated(self):
         """40 bends of the embedded action."""
         return make_bending(40, random_state=0)
@@ -230,7 +173,7 @@ class Data:
     @cached_property
     def copies(self):
         """40 warped copies of a single source."""
-        return warped_copies()
+        return list(known_warps(0, 0.5, 2.0, 0.02, n=40)[0])
 
     @cached_property
     def walks(self):
@@ -277,11 +220,6 @@ def each(method, X, count=10):
     return Work(run, count)
 
 
-def single(X):
-    """In single precision."""
-    return [x.astype(np.float32) for x in X]
-
-
 def with_model():
     """A synchronizer and a model."""
     return make_pipeline(dense(), ActionModel())
@@ -302,11 +240,6 @@ def detector_of_positions(data):
 def online(data):
     """A fitted synchronizer of running movements."""
     return OnlineSynchronizer(dense(), frame_rate=120).fit(data.hops)
-
-
-def tracker(data):
-    """A fitted tracker."""
-    return MotionTracker(dense(), frame_rate=120, random_state=0).fit(data.hops)
 
 
 def steps(estimator, frames):
@@ -341,42 +274,14 @@ def part_sync(data):
     return fit(lambda: PartSynchronizer(parts=parts), data.hops_on_clock)
 
 
-def keyframe_ft(data):
-    X = data.hops_on_clock
-    keyframes = np.full((len(X), 1), 50.0)
-    return Work(lambda: LinearSynchronizer(n_frames=P).fit_transform(X, keyframes=keyframes))
-
-
-def model_only_score(data):
-    aligned = dense().fit_transform(data.hops_on_clock)
-    model = ActionModel().fit(aligned)
-    return Work(lambda: model.score_samples(aligned))
-
-
-def classified(classifier):
-    """The actions of 30 trials, by a classifier of 60 others."""
-    X, actions = three_actions(20, 0)
-    classifier.fit(X, actions)
+def clf_predict30(data):
+    classifier = ActionClassifier().fit(*three_actions(20, 0))
     return Work(partial(classifier.predict, three_actions(10, 50)[0]))
 
 
-def clf_lone(data):
-    X, actions = three_actions(20, 0)
-    classifier = ActionClassifier().fit(X, actions)
-    return each(classifier.predict, warped_sines(5, seed=9), 5)
-
-
-def searched(make_query):
-    """The search for a performance in a long take."""
-    query, take = make_query(), long_take()
+def search_sync_20000(data):
+    query, take = dense().fit(warped_sines(20)), long_take()
     return Work(lambda: find_performances(query, take))
-
-
-def cosines_1e5(data):
-    postures = data.simulated.data
-    take = [np.resize(postures[0], (100_000, *postures[0].shape[1:]))]
-    cosines = DirectionCosines(data.simulated.skeleton).fit(postures)
-    return Work(lambda: cosines.transform(take))
 
 
 def aspace_fit(data):
@@ -405,20 +310,8 @@ def disp_sync(data):
     return drawn(lambda: SynchronizationDisplay.from_estimator(sync, data.hops_on_clock))
 
 
-def disp_model(data):
-    pipe = with_model().fit(data.hops_on_clock)
-    return drawn(lambda: ActionModelDisplay.from_estimator(pipe, data.hops_on_clock))
-
-
-def disp_skeleton(data):
-    bunch = data.simulated
-    return drawn(lambda: SkeletonDisplay.from_positions(bunch.data[0], skeleton=bunch.skeleton))
-
-
-def of_match(data, method):
-    """A method of the match of the hops."""
-    match = dense().fit(data.hops_on_clock).match(data.hops_on_clock)
-    return Work(getattr(match, method))
+def interval33(data):
+    return Work(dense().fit(data.hops_on_clock).match(data.hops_on_clock).interval)
 
 
 def blend(data):
@@ -458,90 +351,45 @@ JOBS = {
     "fit_hops33": lambda data: fit(dense, data.hops_on_clock),
     "fit_bends24": lambda data: fit(dense, data.bends),
     "fit_sim40": lambda data: fit(dense, data.simulated_points),
-    "fit_people100": lambda data: fit(dense, data.many_hops),
     "fit_curves400": lambda data: fit(dense, warped_sines(400)),
-    "fit_n10": lambda data: fit(dense, data.hops_on_clock[:10]),
-    "fit_n2": lambda data: fit(dense, data.hops_on_clock[:2]),
     "fit_1feature": lambda data: fit(dense, data.hop_feature),
     "paper64_source": lambda data: fit(paper, data.copies),
-    "paper32_source": lambda data: fit(paper, single(data.copies)),
-    "paper64_walks": lambda data: fit(paper, data.walks),
-    "paper32_walks": lambda data: fit(paper, single(data.walks)),
-    "paper_fit_transform": lambda data: Work(lambda: paper().fit_transform(data.walks)),
-    "fit_transform_hops": lambda data: Work(lambda: dense().fit_transform(data.hops_on_clock)),
+    "paper32_walks": lambda data: fit(paper, np.float32(data.walks)),
     "lone_hops": lambda data: each(dense().fit(data.hops_on_clock).transform, data.hops_on_clock),
-    "lone_bends": lambda data: each(dense().fit(data.bends).transform, data.bends),
-    "lone_source": lambda data: each(dense().fit(data.copies).transform, data.copies),
-    "lone_walks": lambda data: each(dense().fit(data.walks).transform, data.walks),
     "lone_paper": lambda data: each(paper().fit(data.walks).transform, data.walks),
     "lone_1feature": lambda data: each(dense().fit(data.hop_feature).transform, data.hop_feature),
-    "all_hops33": lambda data: Work(
-        partial(dense().fit(data.hops_on_clock).transform, data.hops_on_clock)
-    ),
-    "all_source40": lambda data: Work(partial(dense().fit(data.copies).transform, data.copies)),
-    "all_paper40": lambda data: Work(partial(paper().fit(data.walks).transform, data.walks)),
-    "match_hops33": lambda data: Work(
-        partial(dense().fit(data.hops_on_clock).match, data.hops_on_clock)
-    ),
     "part_sync": part_sync,
     "linear_ft": lambda data: Work(
         lambda: LinearSynchronizer(n_frames=P).fit_transform(data.hops_on_clock)
     ),
-    "keyframe_ft": keyframe_ft,
     "model_fit": lambda data: fit(with_model, data.hops_on_clock),
-    "model_only_fit": lambda data: fit(ActionModel, dense().fit_transform(data.hops_on_clock)),
     "model_predict": lambda data: on_model(data, lambda pipe: pipe.predict(data.hops_on_clock)),
-    "model_score_samples": lambda data: on_model(
-        data, lambda pipe: pipe.score_samples(data.hops_on_clock)
-    ),
-    "model_only_score": model_only_score,
-    "model_sample": lambda data: on_model(data, lambda pipe: pipe[-1].sample(20, random_state=0)),
     "departures": lambda data: on_model(
         data, lambda pipe: find_departures(pipe, data.hops_on_clock[:5])
     ),
-    "detector_fit": lambda data: fit(lambda: ActionDetector(with_model()), data.hops_on_clock),
+    "detector_fit": lambda data: fit(partial(detector_of_positions, data), data.hop_positions),
     "detector_predict": lambda data: Work(
-        partial(ActionDetector(with_model()).fit(data.hops_on_clock).predict, data.hops_on_clock)
-    ),
-    "detector_lone": lambda data: each(
-        ActionDetector(with_model()).fit(data.hops_on_clock).predict, data.hops_on_clock
-    ),
-    "detectorpipe_fit": lambda data: fit(partial(detector_of_positions, data), data.hop_positions),
-    "detectorpipe_predict": lambda data: Work(
         partial(detector_of_positions(data).fit(data.hop_positions).predict, data.hop_positions)
     ),
-    "detectorpipe_lone": lambda data: each(
+    "detector_lone": lambda data: each(
         detector_of_positions(data).fit(data.hop_positions).predict, data.hop_positions
     ),
-    "clf_fit60": lambda data: fit(ActionClassifier, *three_actions(20, 0)),
-    "clf_predict30": lambda data: classified(ActionClassifier()),
-    "clf_lone": clf_lone,
-    "clf_reject_fit60": lambda data: fit(
-        partial(ActionClassifier, reject_below="auto"), *three_actions(20, 0)
-    ),
-    "clf_reject_predict30": lambda data: classified(ActionClassifier(reject_below="auto")),
-    "search_20000": lambda data: searched(lambda: warped_sines(1)[0]),
-    "search_sync_20000": lambda data: searched(lambda: dense().fit(warped_sines(20))),
+    "clf_predict30": clf_predict30,
+    "search_sync_20000": search_sync_20000,
     "live_step": lambda data: steps(online(data), data.hops[0]),
-    "live_fit": lambda data: fit(partial(OnlineSynchronizer, dense(), frame_rate=120), data.hops),
     "live_step8": lambda data: steps(online(data), np.stack([data.hops[0]] * 8, axis=1)),
     "tracker_fit": lambda data: fit(
         partial(MotionTracker, dense(), frame_rate=120, random_state=0), data.hops
     ),
-    "tracker_track": lambda data: Work(
-        partial(tracker(data).track, data.hops[:1]), len(data.hops[0])
+    "tracker_step": lambda data: steps(
+        MotionTracker(dense(), frame_rate=120, random_state=0).fit(data.hops), data.hops[0]
     ),
-    "tracker_smooth": lambda data: Work(
-        partial(tracker(data).smooth, data.hops[:1]), len(data.hops[0])
-    ),
-    "tracker_step": lambda data: steps(tracker(data), data.hops[0]),
     "cosines_hops": lambda data: Work(
         partial(
             DirectionCosines(data.hdm05.skeleton).fit(data.hdm05.data).transform,
             list(data.hdm05.data),
         )
     ),
-    "cosines_1e5": cosines_1e5,
     "aspace_fit": aspace_fit,
     "read_bvh": lambda data: Work(partial(read_motion, data.recorded("bvh/007_01.bvh"))),
     "read_c3d": read_c3d,
@@ -549,19 +397,13 @@ JOBS = {
     "cycles_fit": lambda data: fit(partial(CycleSegmenter, start=0), [long_walk()]),
     "cycles_segment": cycles_segment,
     "pairwise_velocity": lambda data: Work(partial(synchronization_distances, data.hops_on_clock)),
-    "pairwise_posture": lambda data: Work(
-        partial(synchronization_distances, data.hops_on_clock, cost="posture")
-    ),
     "disp_sync": disp_sync,
-    "disp_model": disp_model,
-    "disp_skeleton": disp_skeleton,
-    "to_frame_match": lambda data: of_match(data, "to_frame"),
     "blend": blend,
     "clone_params": clone_params,
     "compare_groups40": compare_groups40,
     "compare_norm": compare_norm,
     "report40": report40,
-    "interval33": lambda data: of_match(data, "interval"),
+    "interval33": interval33,
 }
 
 # -- the process ------------------------------------------------------------------------

@@ -1,19 +1,18 @@
 """The phase of a running movement: how far it is from what the whole clip says, beside peers.
 
-    python benchmarks/live.py DATA_FOLDER [phase] [moments] [confidence] [intervals]
+    python benchmarks/live.py DATA_FOLDER [phase] [intervals]
 
 Every actor is held out in turn: aSpace, synchronizer and mean are learnt of the others, P = 100.
 The reference is the phase of a whole clip, ``DenseSynchronizer(n_frames=100).match(clip)``, read
 the other way round (`truth_of`). Errors are in frames of 100, of all frames after the first fifth
 of a clip, up to its last.
 
-Peers see the frames up to the present one only; `linear_known` alone is told how long the clip will
-be. They are written here from their descriptions; those that match look at the clip on *ticks*, the
-times in which a performance of mean duration passes one frame of the pattern.
+Peers see the frames up to the present one only. They are written here from their descriptions, and
+look at the clip on *ticks*, the times in which a performance of mean duration passes one frame of
+the pattern.
 
-*Moments* are those of harness.py. *Confidence* is that of what is no such movement. *Intervals*
-are those of 90 %, all frames counted: the constants of the package were chosen on HDM05, and
-nothing was chosen on UTKinect. Prints Markdown.
+*Intervals* are those of 90 %, all frames counted: the constants of the package were chosen on
+HDM05, and nothing was chosen on UTKinect. Prints Markdown.
 """
 
 import functools
@@ -31,11 +30,9 @@ from harness import (
     print_row,
     read_actions,
     run_tables,
-    show_pair,
 )
 from scipy.signal import lfilter
 from scipy.spatial.distance import cdist
-from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, OnlineSynchronizer
 
@@ -43,11 +40,6 @@ ARCHIVES = {"hdm05": "HDM05", "utkinect": "UTKinect"}
 OURS = "OnlineSynchronizer"
 # Width of the one-sided filter of the peers, in frames of the pattern.
 WIDTH = 2.0
-LIMBS = [
-    (f"{side}_{a}", f"{side}_{b}")
-    for side in ("left", "right")
-    for a, b in (("thigh", "leg"), ("arm", "forearm"))
-]
 
 # -- peers ------------------------------------------------------------------------------
 
@@ -191,32 +183,11 @@ class Dixon:
         total[i, j] = min(ways, default=cost)
 
 
-# -- without matching -------------------------------------------------------------------
-
-
-def linear_known(known, clip):
-    """Evenly, as if it were known when the clip ends."""
-    return np.linspace(0, len(known.mean) - 1, len(clip))
-
-
-def linear_mean(known, clip):
-    """Evenly, as a clip of mean duration."""
-    return np.minimum(np.arange(len(clip)) / known.tick, len(known.mean) - 1)
-
-
-def nearest_posture(known, clip):
-    """Where the mean is nearest to what is seen, whatever came before."""
-    return cdist(clip, known.mean).argmin(axis=1).astype(float)
-
-
 PEERS = {
     "open-end DTW, velocities": open_end_dtw,
     "open-end DTW, postures": functools.partial(open_end_dtw, kind="postures"),
     "Dixon's online DTW, velocities": dixon,
     "Dixon's online DTW, postures": functools.partial(dixon, kind="postures"),
-    "nearest posture": nearest_posture,
-    "linear, duration known": linear_known,
-    "linear, mean duration": linear_mean,
 }
 
 # -- people -----------------------------------------------------------------------------
@@ -226,33 +197,19 @@ PEERS = {
 class Fold:
     """What is known of an action from all actors but one, and the clips of that one.
 
-    ``truths``: the phases of the frames of each clip. ``moments`` {event: (n_clips,)}: when the
-    clips show the events of harness.py. ``landed`` {event: phase}: where the pattern has them.
-    ``wrong``: what the same actor does otherwise. ``positions``: the joints of the clips.
-    ``points``: makes features of joint positions, ``names`` are theirs.
+    ``truths``: the phases of the frames of each clip. ``wrong``: what the same actor does
+    otherwise. ``positions``: the joints of the clips. ``points``: makes features of joint
+    positions.
     """
 
     action: str
     online: OnlineSynchronizer
     known: Known
-    training: list
     clips: list
     truths: list
-    moments: dict
-    landed: dict
     wrong: list
     positions: list
     points: Callable
-    names: list
-
-    @functools.cached_property
-    def live(self):
-        """What is said of the clips, frame by frame: a `LivePhase` of arrays each."""
-        return self.online.track(self.clips)
-
-    @property
-    def phases(self):
-        return [live.phase for live in self.live]
 
     def errors(self, phases):
         """Absolute errors of the phases of all clips, each after its first fifth."""
@@ -279,8 +236,8 @@ def truth_of(times, n_frames):
     return phase_of(times, np.linspace(0, len(times) - 1, n_frames))
 
 
-def held_out(actions, space=True):
-    """A fold for every action and actor, by action; in the aSpace of the others, or cosines.
+def held_out(actions):
+    """A fold for every action and actor, by action, in the aSpace of the others.
 
     The actions are of one archive.
     """
@@ -292,7 +249,7 @@ def held_out(actions, space=True):
         for actor in np.unique(action.actors):
             train, test = (np.flatnonzero((action.actors == actor) == held) for held in (0, 1))
             others = [own[i] for i in train]
-            points = ASpace().fit(others) if space else None
+            points = ASpace().fit(others)
             wrong = [
                 postures[a.name][i]
                 for a in actions
@@ -300,45 +257,35 @@ def held_out(actions, space=True):
                 for i in np.flatnonzero(a.actors == actor)
             ]
             clips = others, [own[i] for i in test], wrong
-            if space:
-                # Of one action alone there is nothing wrong.
-                clips = [points.transform(some) if some else [] for some in clips]
-            fold = _learn(action, train, test, *clips, make_pipeline(*filter(None, (body, points))))
+            # Of one action alone there is nothing wrong.
+            clips = [points.transform(some) if some else [] for some in clips]
+            fold = _learn(action, test, *clips, make_pipeline(body, points))
             folds.setdefault(action.name, []).append(fold)
     return folds
 
 
-def _learn(action, train, test, training, clips, wrong, features):
+def _learn(action, test, training, clips, wrong, features):
     online = OnlineSynchronizer(DenseSynchronizer(n_frames=P)).fit(training)
     sync = online.synchronizer_
-    seen, whole = sync.match(training).times, sync.match(clips).times
-    landed = {}
-    for event, moments in action.moments.items():
-        pairs = zip(seen, moments[train], strict=True)
-        found = [float(phase_of(tau, m)) for tau, m in pairs if np.isfinite(m)]
-        landed[event] = np.median(found) if found else np.nan
+    whole = sync.match(clips).times
     duration = float(np.mean([len(x) for x in training]))
     return Fold(
         action=action.name,
         online=online,
         known=Known(online.mean_, duration),
-        training=training,
         clips=clips,
         truths=[truth_of(tau, len(x)) for tau, x in zip(whole, clips, strict=True)],
-        moments={event: moments[test] for event, moments in action.moments.items()},
-        landed=landed,
         wrong=wrong,
         positions=[action.data[i] for i in test],
         points=features.transform,
-        names=list(features.get_feature_names_out()),
     )
 
 
 @functools.cache
-def folds_of(folder, archive, space=True):
+def folds_of(folder, archive):
     """{action: folds} of an archive."""
     events = [event for event in EVENTS if event.archive == archive]
-    return held_out(read_actions(folder, events), space)
+    return held_out(read_actions(folder, events))
 
 
 # -- how right it is --------------------------------------------------------------------
@@ -361,72 +308,8 @@ def phase_table(folder):
 def phases_of(fold, method):
     """The phases of the clips of a fold, by ours or by a peer."""
     if method == OURS:
-        return fold.phases
+        return [live.phase for live in fold.online.track(fold.clips)]
     return [PEERS[method](fold.known, clip) for clip in fold.clips]
-
-
-def moment_table(folder):
-    """Mean / median errors of the phase at key moments: live, of the whole clip, their ratio."""
-    for archive, name in ARCHIVES.items():
-        print_head(f"key moments, {name}", ["clips", "live", "whole clip", "ratio of means"])
-        rows = []
-        for action, some in folds_of(folder, archive).items():
-            for event in some[0].moments:
-                both = np.concatenate([moment_errors(fold, event) for fold in some])
-                rows.append([[x.mean(), np.median(x)] for x in both.T])
-                (live, _), (whole, _) = rows[-1]
-                cells = [str(len(both)), *map(show_pair, rows[-1]), f"{live / whole:.2f}"]
-                print_row(f"{action}: {event}", cells)
-        live, whole = np.mean(rows, axis=0)
-        print_row("mean", ["", show_pair(live), show_pair(whole), f"{live[0] / whole[0]:.2f}"])
-
-
-def moment_errors(fold, event):
-    """Errors of the phase at an event, (n_clips that show it, 2): live and of the whole clip."""
-    found = []
-    for phase, truth, moment in zip(fold.phases, fold.truths, fold.moments[event], strict=True):
-        if np.isfinite(moment + fold.landed[event]):
-            frame, frames = moment * (len(truth) - 1) / (P - 1), np.arange(len(truth))
-            at = np.array([np.interp(frame, frames, phases) for phases in (phase, truth)])
-            found.append(np.abs(at - fold.landed[event]))
-    return np.reshape(found, (-1, 2))
-
-
-# -- who does not do it -----------------------------------------------------------------
-
-
-def confidence_table(folder):
-    """Of the action and of what is none, at half of a clip and at its end.
-
-    The median phase; the quantiles 10, 50 and 90 % of confidence; AUC against the action.
-    """
-    for archive, name in ARCHIVES.items():
-        found = {}
-        for action, some in folds_of(folder, archive).items():
-            for fold in some:
-                kinds = {
-                    "the action": fold.live,
-                    "another action": fold.online.track(fold.wrong[::3]),
-                    "standing still": fold.online.track([x[[0] * len(x)] for x in fold.clips]),
-                    "backwards": fold.online.track([x[::-1] for x in fold.clips]),
-                }
-                for kind, lives in kinds.items():
-                    said = [np.array(live)[[0, 2]][:, [live.phase.size // 2, -1]] for live in lives]
-                    found.setdefault(kind, {}).setdefault(action, []).extend(said)
-        print_head(f"confidence, {name}", 2 * ["phase", "confidence", "AUC"])
-        for kind, wrong in found.items():
-            phases, confidences = np.concatenate(list(wrong.values())).transpose(1, 2, 0)
-            cells = []
-            for when, (phase, confidence) in enumerate(zip(phases, confidences, strict=True)):
-                aucs = [auc(found["the action"][a], wrong[a], when) for a in wrong]
-                quantiles = " ".join(f"{q:.2f}" for q in np.quantile(confidence, [0.1, 0.5, 0.9]))
-                cells += [f"{np.median(phase):.0f}", quantiles, f"{np.mean(aucs):.2f}"]
-            print_row(kind, cells)
-
-
-def auc(right, wrong, when):
-    scores = [said[1, when] for said in (*right, *wrong)]
-    return roc_auc_score(np.repeat([1, 0], [len(right), len(wrong)]), scores)
 
 
 # -- intervals --------------------------------------------------------------------------
@@ -447,12 +330,6 @@ def conditions(fold, seed=0):
     yield "all hidden for a fifth", [_with_gap(x, rng) for x in clips], None, truths
     stamps = [np.arange(0.0, len(x), 4) for x in clips]
     yield "every fourth frame", [x[::4] for x in clips], stamps, [t[::4] for t in truths]
-    of_limbs = [_columns(fold.names, limb) for limb in LIMBS]
-    if all(map(len, of_limbs)):
-        hidden = [x.copy() for x in clips]
-        for x in hidden:
-            x[:, of_limbs[rng.integers(len(LIMBS))]] = np.nan
-        yield "one limb hidden", hidden, None, truths
     yield "another action", fold.wrong[::3], None, None
     yield "standing still", [x[[0] * len(x)] for x in clips], None, None
 
@@ -465,11 +342,6 @@ def _with_gap(x, rng):
 def _between(n, begin, end):
     frames = np.arange(n)[:, np.newaxis]
     return (frames >= begin) & (frames < end)
-
-
-def _columns(names, limb):
-    """Features of the segments of a limb, of cosines named by segment and axis."""
-    return [k for k, name in enumerate(names) if name[:-2] in limb]
 
 
 def inside(lower, upper, truth):
@@ -488,27 +360,24 @@ def summary(by_action):
 def interval_table(folder):
     """A line a condition: truths inside (%), those of the worst action, and mean width."""
     for archive, name in ARCHIVES.items():
-        for space, kind in ((True, "aSpace"), (False, "cosines")):
-            found = {}
-            for action, some in folds_of(folder, archive, space).items():
-                for fold in some:
-                    for condition, clips, stamps, truths in conditions(fold):
-                        truths = [np.nan] * len(clips) if truths is None else truths
-                        rows = found.setdefault(condition, {}).setdefault(action, [])
-                        lives = fold.online.track(clips, times=stamps)
-                        for live, truth in zip(lives, truths, strict=True):
-                            rows.append(inside(live.lower, live.upper, truth))
-            print_head(f"intervals, {name}, {kind}", ["inside", "worst action", "mean width"])
-            for condition, by_action in found.items():
-                held, width, least, worst = summary(by_action)
-                cells = [f"{held:.0f}", f"{least:.0f} ({worst})"] if held == held else ["", ""]
-                print_row(condition, [*cells, f"{width:.1f}"])
+        found = {}
+        for action, some in folds_of(folder, archive).items():
+            for fold in some:
+                for condition, clips, stamps, truths in conditions(fold):
+                    truths = [np.nan] * len(clips) if truths is None else truths
+                    rows = found.setdefault(condition, {}).setdefault(action, [])
+                    lives = fold.online.track(clips, times=stamps)
+                    for live, truth in zip(lives, truths, strict=True):
+                        rows.append(inside(live.lower, live.upper, truth))
+        print_head(f"intervals, {name}", ["inside", "worst action", "mean width"])
+        for condition, by_action in found.items():
+            held, width, least, worst = summary(by_action)
+            cells = [f"{held:.0f}", f"{least:.0f} ({worst})"] if held == held else ["", ""]
+            print_row(condition, [*cells, f"{width:.1f}"])
 
 
 TABLES = {
     "phase": phase_table,
-    "moments": moment_table,
-    "confidence": confidence_table,
     "intervals": interval_table,
 }
 

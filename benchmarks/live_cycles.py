@@ -1,13 +1,13 @@
 """Walking followed live: how far the phase is from foot strikes.
 
-    python benchmarks/live_cycles.py DATA_FOLDER [jogs] [walks] [angles] [kinect]
+    python benchmarks/live_cycles.py DATA_FOLDER [jogs] [walks] [kinect]
 
 By ``OnlineSynchronizer(cyclic=True)``. A template is learnt from the cycles that `CycleSegmenter`
 cuts from the takes of others. A minute is chained from the cycles of the person held out, as foot
 strikes cut them (cycles.py): each is drawn to the beginning of the next, the pace goes from 0.75 to
 1.25 of its own within 20 seconds, the body travels, turns round twice, and begins in mid-cycle. The
-truth is a line between foot strikes; the phase of the other foot is that of the training cycles. Of
-the angles of `make_gait` it is the moment that each frame shows. Errors are in per cent of a cycle,
+truth is a line between foot strikes; the phase of the other foot is that of the training cycles.
+Errors are in per cent of a cycle,
 from the second cycle on. A strike is told when the number of the cycle rises; it is missed where
 none is within a quarter of a cycle. The walks of CMU are of one person, so that takes are held out.
 UTKinect has one or two cycles a take, and many of its strikes are no strikes: four of ten people
@@ -30,7 +30,6 @@ from sklearn_motionsync import (
     OnlineSynchronizer,
     Skeleton,
 )
-from sklearn_motionsync.datasets import make_gait
 
 SECONDS = 60
 # Amplitude and seconds of the changes of pace; seconds at which turns begin, and of one turn.
@@ -184,28 +183,6 @@ def phase_of_other_foot(live, features, cycles, takes, start):
     return np.median(found) / (P - 1)
 
 
-def gait_walkers(n_people=10):
-    """The same of the angles of a leg, and the force below."""
-    known, minutes = (
-        make_gait(n_people, n_cycles=n, takes=takes, random_state=0)
-        for n, takes in ((3, False), (SECONDS, True))
-    )
-    for k, x in enumerate(minutes.data):
-        chosen = np.flatnonzero(known.person != f"person{k}")
-        live = follow_cycles([known.data[i] for i in chosen], 100)
-        taus = live.synchronizer_.match([known.data[i] for i in chosen]).times
-        # The moment at each phase: the mean of the cycles.
-        moments = np.mean(
-            [np.interp(tau / (P - 1), np.linspace(0, 1, len(known.times[i])), known.times[i])
-             for tau, i in zip(taus, chosen, strict=True)],
-            axis=0,
-        )  # fmt: skip
-        values, truth = paced(x, minutes.times[k], 100)
-        truth = np.floor(truth) + np.interp(truth % 1, moments, np.linspace(0, 1, P))
-        wrong = {"standing still": values[[0] * len(values)], "backwards": values[::-1]}
-        yield Walker(f"person{k}", live, values, truth, wrong)
-
-
 # -- figures ------------------------------------------------------------------------------
 
 
@@ -285,12 +262,8 @@ def kinect(folder):
     cycle_table("walks (UTKinect), people held out", walkers(takes, "right", others))
 
 
-def angles(folder):
-    cycle_table("angles (make_gait), people held out", gait_walkers())
-
-
 if __name__ == "__main__":
     # Takes without cycles, and of other movements, warn.
     warnings.simplefilter("ignore")
-    tables = {"jogs": jogs, "walks": walks, "angles": angles, "kinect": kinect}
+    tables = {"jogs": jogs, "walks": walks, "kinect": kinect}
     run_tables(tables, command_line(__doc__))

@@ -5,12 +5,11 @@
 
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect of the same form, with
 utkinect/utkinect_splits.json: ten halves of the actors to learn from, on which published results
-stand. Nothing of `ActionClassifier` is chosen here. Of every other way the best setting is shown,
-chosen by the result: view (cosines, positions or both), length and scale with the largest accuracy;
-and in a row of its own the best that any of their settings reaches, every number by itself. Ways of
-packages that are not installed are left out. Unknown actions are left out of the training in turn:
-the area under the curve of the novelty of all test clips, mean over splits and actions. Prints
-Markdown.
+stand. Nothing of `ActionClassifier` is chosen here. Every other way has the view (cosines,
+positions or both) and the length that were the best of three views and two lengths by their result.
+Ways of packages that are not installed are left out. Unknown actions are left out of the training
+in turn: the area under the curve of the novelty of all test clips, mean over splits and actions.
+*Rejected* is what ``reject_below="auto"`` rejects. Prints Markdown.
 
 A recognizer is bound to recordings and takes indices of them: what it learns from, and what it is
 asked about. Other ways are functions ``decide(train, test)`` that give classes and scores
@@ -108,10 +107,6 @@ class Classifier:
         return ActionClassifier().fit(self._recordings.some(self._view, train), actions, groups)
 
 
-def classifier(recordings, view, n_frames):
-    return {CLASSIFIER: {"": Classifier(recordings, view)}}
-
-
 # -- scores, and what is made of them ---------------------------------------------------
 
 
@@ -137,27 +132,29 @@ class Scored:
 C = 10
 
 
-def dtw(recordings, view, n_frames):
-    """Nearest neighbours, and support vector machines on the kernel exp(-D / median D).
-
-    Distances are the roots of aeon's, which do better.
-    """
+def dtw_distances(recordings, view):
+    """Roots of aeon's distances, which do better."""
     import aeon.distances
 
-    X = np.ascontiguousarray(on_clock(recordings, view, n_frames).transpose(0, 2, 1))
+    X = np.ascontiguousarray(on_clock(recordings, view, 50).transpose(0, 2, 1))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        D = np.sqrt(aeon.distances.dtw_pairwise_distance(X))
+        return np.sqrt(aeon.distances.dtw_pairwise_distance(X))
 
-    def nearest(train, test):
+
+def nearest_neighbour(recordings):
+    D = dtw_distances(recordings, BOTH)
+
+    def decide(train, test):
         labels, to_train = recordings.actions[train], D[np.ix_(test, train)]
         each = [-to_train[:, labels == c].min(axis=1) for c in np.unique(labels)]
         return np.unique(labels), np.stack(each, axis=1)
 
-    return {
-        NEAREST: {"": Scored(nearest)},
-        DTW_SVM: {"": machines(recordings, partial(kernel_of, D))},
-    }
+    return Scored(decide)
+
+
+def machines_on_dtw(recordings):
+    return machines(recordings, partial(kernel_of, dtw_distances(recordings, POSITIONS)))
 
 
 def kernel_of(D, train):
@@ -184,16 +181,15 @@ def machines(recordings, kernel):
 # -- what does not warp -----------------------------------------------------------------
 
 
-def pyramid(recordings, view, n_frames):
+def pyramid(recordings):
     """A linear support vector machine on a Fourier temporal pyramid."""
-    X = fourier_pyramid(on_clock(recordings, view, n_frames))
+    X = fourier_pyramid(on_clock(recordings, BOTH, 100))
 
-    def kernel(scaled, train):
-        Z = StandardScaler(with_std=scaled).fit(X[train]).transform(X)
-        return Z @ Z.T / np.square(Z[train]).sum(axis=1).mean()
+    def kernel(train):
+        centred = X - X[train].mean(axis=0)
+        return centred @ centred.T / np.square(centred[train]).sum(axis=1).mean()
 
-    settings = {"": False, "standardised": True}
-    return {PYRAMID: {k: machines(recordings, partial(kernel, v)) for k, v in settings.items()}}
+    return machines(recordings, kernel)
 
 
 def fourier_pyramid(X, n_levels=3, n_frequencies=6):
@@ -209,14 +205,14 @@ def fourier_pyramid(X, n_levels=3, n_frequencies=6):
     return np.concatenate(found, axis=1)
 
 
-def rocket(recordings, view, n_frames):
+def rocket(recordings):
     """Ridge regression on MiniRocket's features, as in aeon's classifier.
 
     The thresholds of the features are those of all clips, the tested ones as well.
     """
     from aeon.transformations.collection.convolution_based import MiniRocket
 
-    X = np.ascontiguousarray(on_clock(recordings, view, n_frames).transpose(0, 2, 1))
+    X = np.ascontiguousarray(on_clock(recordings, COSINES, 50).transpose(0, 2, 1))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         X = np.asarray(MiniRocket(random_state=0).fit_transform(X.astype(np.float32)))
@@ -229,31 +225,22 @@ def rocket(recordings, view, n_frames):
         # Of two classes the library gives one column.
         return pipe.classes_, scores if scores.ndim > 1 else np.column_stack([-scores, scores])
 
-    return {ROCKET: {"": Scored(decide)}}
+    return Scored(decide)
 
 
 # -- all of them ------------------------------------------------------------------------
 
-CLASSIFIER, NEAREST, DTW_SVM = "`ActionClassifier`", "1-NN DTW", "SVM on DTW"
-PYRAMID, ROCKET = "Fourier pyramid + SVM", "MiniRocket + ridge"
-# The function, the views, the lengths, the package.
-WAYS = [
-    (dtw, VIEWS, (50,), "aeon"),
-    (rocket, VIEWS, (50, 100), "aeon"),
-    (classifier, (COSINES, BOTH), (None,), None),
-    (pyramid, VIEWS, (50, 100), None),
-]
-
-
-def ways():
-    """(function, view, length) of everything that is installed; those that take long first."""
-    return [
-        (way, view, n_frames)
-        for way, views, lengths, package in WAYS
-        for view in views
-        for n_frames in lengths
-        if package is None or version_of(package) is not None
-    ]
+# What makes a recognizer of recordings, and the package that it needs.
+WAYS = {
+    **{
+        f"`ActionClassifier`, {view}": (partial(Classifier, view=view), None)
+        for view in (COSINES, BOTH)
+    },
+    f"1-NN DTW, {BOTH}, 50 frames": (nearest_neighbour, "aeon"),
+    f"SVM on DTW, {POSITIONS}, 50 frames": (machines_on_dtw, "aeon"),
+    f"MiniRocket + ridge, {COSINES}, 50 frames": (rocket, "aeon"),
+    f"Fourier pyramid + SVM, {BOTH}, 100 frames": (pyramid, None),
+}
 
 
 # -- folds ------------------------------------------------------------------------------
@@ -272,19 +259,14 @@ def actors_left_out(actors):
     return list(LeaveOneGroupOut().split(actors, groups=actors))
 
 
-# -- what is found on a fold ------------------------------------------------------------
+# -- what is found on folds -------------------------------------------------------------
 
 SPLITS, LEFT_OUT, AREA = "ten splits", "leave one subject out", "AUC of unknown actions"
 
 
-def examine_split(recognizer, recordings, train, test):
-    """{figure: values} of everything that is told of a split."""
-    actions = recordings.actions
-    classes = np.unique(actions[train])
-    return {
-        SPLITS: [np.mean(recognizer.predict(train, test) == actions[test])],
-        AREA: [unknown_area(recognizer, actions, action, train, test) for action in classes],
-    }
+def share_right(recognizer, recordings, train, test):
+    """The share of a fold that is recognised."""
+    return np.mean(recognizer.predict(train, test) == recordings.actions[test])
 
 
 def unknown_area(recognizer, actions, action, train, test):
@@ -295,95 +277,23 @@ def unknown_area(recognizer, actions, action, train, test):
     return roc_auc_score(unknown, recognizer.novelty(train[actions[train] != action], test))
 
 
-def examine_fold(figure, recognizer, recordings, train, test):
-    """{figure: share that is recognised}"""
-    return {figure: [np.mean(recognizer.predict(train, test) == recordings.actions[test])]}
-
-
-def examine(way, view, n_frames, recordings, tasks):
-    """{(name, setting): {figure: values}} of tasks, each a function and folds."""
-    found: dict = {}
-    for name, settings in way(recordings, view, n_frames).items():
-        for setting, recognizer in settings.items():
-            lengths = [f"{n_frames} frames"] if n_frames else []
-            text = ", ".join([view, *lengths, *filter(None, [setting])])
-            figures = found.setdefault((name, text), {})
-            for look, folds in tasks:
-                for fold in folds:
-                    for figure, values in look(recognizer, recordings, *fold).items():
-                        figures.setdefault(figure, []).extend(values)
-    return found
-
-
-def examine_all(recordings, tasks):
-    """{name: {setting: {figure: values}}} of all ways.
-
-    Those that know nothing to share between folds are given one at a time.
-    """
-    work = []
-    for way, view, n_frames in ways():
-        parts = [tasks]
-        if way is classifier:
-            parts = [[(look, [fold])] for look, folds in tasks for fold in folds]
-        work += [(way, view, n_frames, recordings, part) for part in parts]
-    found: dict = {}
-    for part in Parallel(n_jobs=-1)(delayed(examine)(*one) for one in work):
-        for (name, setting), figures in part.items():
-            known = found.setdefault(name, {}).setdefault(setting, {})
-            for figure, values in figures.items():
-                known[figure] = known.get(figure, []) + values
-    return found
-
-
-# -- tables -----------------------------------------------------------------------------
-
-
-to_tenth = partial(percent, digits=1)
-
-
-def three_digits(value):
-    return "-" if np.isnan(value) else f"{value:.3f}"
-
-
-# Header, figure, what is made of its values, how it is shown, and which is best.
-SPLIT_COLUMNS = [
-    (f"{SPLITS}, mean", SPLITS, np.mean, to_tenth, max),
-    ("worst split", SPLITS, np.min, to_tenth, max),
-    (LEFT_OUT, LEFT_OUT, np.mean, to_tenth, max),
-    (AREA, AREA, np.nanmean, three_digits, max),
-]
-
-
-def recognition_table(name, found, columns):
-    """Ours on both views, others' best settings, and the best of all of those."""
-    print_head(name, [column[0] for column in columns])
-    rows = {
-        f"{CLASSIFIER}, {view}": numbers(figures, columns)
-        for view, figures in found[CLASSIFIER].items()
-    }
-    others = {way: settings for way, settings in found.items() if way != CLASSIFIER}
-    for way, settings in others.items():
-        best = max(settings, key=lambda s: shares(settings[s], columns))
-        rows[f"{way}, {best}"] = numbers(settings[best], columns)
-    every = [numbers(figures, columns) for of in others.values() for figures in of.values()]
-    best = [
-        better([n for n in column if not np.isnan(n)])
-        for column, (*_, better) in zip(zip(*every, strict=True), columns, strict=bool(others))
-    ]
-    if others:
-        rows["*the best of others' settings, every number by itself*"] = best
-    for row, values in rows.items():
-        print_row(row, [show(v) for v, (*_, show, _) in zip(values, columns, strict=True)])
-
-
-def shares(figures, columns):
-    """What settings are chosen by: shares that are recognised, ties by the next column."""
-    return [summary(figures[figure]) for _, figure, summary, show, _ in columns if show is to_tenth]
-
-
-def numbers(figures, columns):
-    """One of a column."""
-    return [summary(figures[figure]) for _, figure, summary, *_ in columns]
+def recognition_table(recordings, splits):
+    """The shares that each way recognises, and how well it tells unknown actions."""
+    print_head(recordings.name, [f"{SPLITS}, mean", "worst split", LEFT_OUT, AREA])
+    left_out = actors_left_out(recordings.actors)
+    for name, (make, package) in WAYS.items():
+        if package is not None and version_of(package) is None:
+            continue
+        one = make(recordings)
+        right = [share_right(one, recordings, *split) for split in splits]
+        others = [share_right(one, recordings, *fold) for fold in left_out]
+        areas = Parallel(n_jobs=-1)(
+            delayed(unknown_area)(one, recordings.actions, action, train, test)
+            for train, test in splits
+            for action in np.unique(recordings.actions[train])
+        )
+        cells = [percent(x, 1) for x in (np.mean(right), np.min(right), np.mean(others))]
+        print_row(name, [*cells, f"{np.nanmean(areas):.3f}"])
 
 
 # -- what is rejected -------------------------------------------------------------------
@@ -412,29 +322,18 @@ def rejected_on_split(recordings, train, test):
 
 
 def rejection_table(recordings, splits, name):
-    """What the classifier rejects on cosines, and how well its novelty tells that."""
+    """What the classifier rejects on cosines."""
     head = f'`ActionClassifier(reject_below="auto")`, {recordings.name}, {name}'
-    print_head(head, ["rejected", "AUC to known actions"])
+    print_head(head, ["rejected"])
     work = [delayed(rejected_on_split)(recordings, *split) for split in splits]
     found = Parallel(n_jobs=-1)(work)
     for kind in found[0]:
         parts = [part for one in found for part in one[kind]]
         rejected = np.mean([np.mean(novelties > border) for novelties, border in parts])
-        areas = []
-        for one in found if kind not in (KNOWN, UNKNOWN) else ():
-            both = [one[KNOWN][0][0], one[kind][0][0]]
-            strange = np.repeat([0, 1], list(map(len, both)))
-            areas.append(roc_auc_score(strange, np.concatenate(both)))
-        print_row(kind, [to_tenth(rejected), f"{np.mean(areas):.2f}" if areas else "-"])
+        print_row(kind, [percent(rejected, 1)])
 
 
 # -- all of it --------------------------------------------------------------------------
-
-
-def action_table(kinect, optical, splits):
-    tasks = [(examine_split, splits)]
-    tasks.append((partial(examine_fold, LEFT_OUT), actors_left_out(kinect.actors)))
-    recognition_table(kinect.name, examine_all(kinect, tasks), SPLIT_COLUMNS)
 
 
 def rejection_tables(kinect, optical, splits):
@@ -457,7 +356,7 @@ if __name__ == "__main__":
     command = command_line(__doc__)
     print_versions("scipy", "scikit-learn", "aeon")
     tables = {
-        "actions": lambda folder: action_table(*read(folder)),
+        "actions": lambda folder: recognition_table(*read(folder)[::2]),
         "rejected": lambda folder: rejection_tables(*read(folder)),
     }
     run_tables(tables, command)

@@ -1,14 +1,16 @@
-"""Memory and time of many performances, as in docs/scaling.md.
+"""Memory and time of many trials, as in docs/scaling.md.
+
+    OMP_NUM_THREADS=1 python benchmarks/scaling.py [memory] [many] [classes] [--size 20000]
 
 Random bends of 100 frames as points of their aSpace, 16 features, single precision, which are made
-once, in five minutes. Every line is of a process of its own. Memory is its peak above what it had
-when it began, data in memory included; pages of a memory map that were looked at count, though the
-system can take them back. Processor time of one thread. ``memory`` takes ten minutes, ``sample``
-one, ``many`` ten, and ``classes`` (`ActionClassifier` of four actions) three.
-
-    OMP_NUM_THREADS=1 python benchmarks/scaling.py [memory] [sample] [many] [classes]
+once, in five minutes. Every line of *memory* and *many* is of a process of its own (Linux). Memory
+is its peak above what it had when it began, data in memory included; pages of a memory map that
+were looked at count, though the system can take them back. *Many* trials are ten times as many, a
+tenth of them different, by memory maps, 1000 at a time, and a fit of 500. *Classes* are those of
+`ActionClassifier`, compared with all trials and with landmarks. Processor time of one thread.
 """
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -16,120 +18,76 @@ import time
 from pathlib import Path
 
 import numpy as np
+from harness import print_head, print_row
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ActionClassifier, ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 
-FOLDER = Path(tempfile.gettempdir())
-# So many performances are drawn, and written, at a time.
+# So many trials are drawn, written or transformed at a time.
 AT_ONCE = 1000
-COMMON = """
+MEASURE = """
 import sys, time
 import numpy as np
 from sklearn_motionsync import DenseSynchronizer
 def peak():
     with open("/proc/self/status") as status:
-        return int(next(line for line in status if line.startswith("VmHWM")).split()[1]) * 1024
+        return int(next(line for line in status if line.startswith("VmHWM")).split()[1]) / 1024
 def forget_peak():
     with open("/proc/self/clear_refs", "w") as refs:
         refs.write("5")
-class Files:
-    def __init__(self, path, n):
-        self.path, self.n = path, n
-    def __len__(self):
-        return self.n
-    def __getitem__(self, i):
-        held = np.load(self.path, mmap_mode="r")
-        return np.array(held[i % len(held)])
-path, mode, n, settings = sys.argv[1], sys.argv[2], int(sys.argv[3]), eval(sys.argv[4])
-if mode == "files":
-    X = Files(path, n)
-elif mode == "maps":
-    held = np.load(path, mmap_mode="r")
-    X = [held[i % len(held)] for i in range(n)]
-else:
-    X = np.load(path, mmap_mode="r" if mode == "map" else None)[:n]
-size = n * 100 * 16 * 4
-"""
-FIT = """
+path, mode, n, max_fit, at_once = sys.argv[1], sys.argv[2], *map(eval, sys.argv[3:])
+held = np.load(path, mmap_mode=None if mode == "memory" else "r")
+X = held[:n] if n <= len(held) else [held[i % len(held)] for i in range(n)]
 before, start = peak(), time.process_time()
-sync = DenseSynchronizer(**settings).fit(X)
-seconds = time.process_time() - start
-print(f"{seconds:.1f} s | {(peak() - before) / size:.2f}", end=" | ")
+sync = DenseSynchronizer(max_fit=max_fit).fit(X)
+print(time.process_time() - start, peak() - before)
 forget_peak()
 before, start = peak(), time.process_time()
-sync.transform(X)
-seconds = time.process_time() - start
-print(f"{1e3 * seconds / n:.2f} ms | {(peak() - before) / size:.2f} |")
-"""
-SAMPLE = """
-start = time.process_time()
-sync = DenseSynchronizer(max_fit=500, **settings).fit(X)
-seconds = time.process_time() - start
-print(f"{seconds:.1f} s |")
-"""
-MANY = """
-sync = DenseSynchronizer(max_fit=500, **settings).fit(X)
-forget_peak()
-before, start = peak(), time.process_time()
-at_once = 1000 if mode == "maps" else n
 for first in range(0, n, at_once):
-    sync.transform(X if at_once == n else X[first : first + at_once])
-seconds = time.process_time() - start
-print(f"{seconds:.0f} s | {1e3 * seconds / n:.2f} ms | {(peak() - before) / 2**20:.0f} MB |")
+    sync.transform(X[first : first + at_once])
+print(time.process_time() - start, peak() - before)
 """
 
 
-def bends(n=20_000):
+def bends(n):
     """A file of so many bends."""
-    path = FOLDER / f"bends-{n}-single.npy"
+    path = Path(tempfile.gettempdir()) / f"bends-{n}-single.npy"
     if path.exists():
         return path
-    out = np.lib.format.open_memmap(path, "w+", np.float32, (n, 100, 16))
     first = make_bending(AT_ONCE, random_state=0)
     space = make_pipeline(DirectionCosines(first.skeleton), ASpace(16)).fit(first.data)
     clock = LinearSynchronizer(100).fit(space.transform(first.data))
+    out = np.lib.format.open_memmap(path, "w+", np.float32, (n, 100, 16))
     for start in range(0, n, AT_ONCE):
-        some = make_bending(min(AT_ONCE, n - start), random_state=start).data
-        out[start : start + AT_ONCE] = clock.transform(space.transform(some))
+        drawn = make_bending(min(AT_ONCE, n - start), random_state=start).data
+        out[start : start + AT_ONCE] = clock.transform(space.transform(drawn))
     return path
 
 
-def measure(code, path, mode, n, settings):
-    """What a process of its own prints."""
-    command = [sys.executable, "-c", COMMON + code, path, mode, str(n), repr(settings)]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+def measured(size, mode, n, max_fit=None, at_once=None):
+    """Cells of a process: seconds of the fit, milliseconds of a transform, and their memory."""
+    arguments = [str(bends(size)), mode, str(n), str(max_fit), str(at_once or n)]
+    command = [sys.executable, "-c", MEASURE, *arguments]
+    answer = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    fit, fit_peak, transform, peak = map(float, answer.split())
+    return [f"{fit:.1f}", f"{fit_peak:.0f}", f"{1e3 * transform / n:.2f}", f"{peak:.0f}"]
 
 
-def memory():
+HEADER = ["fit, s", "MB", "transform, each, ms", "MB"]
+
+
+def memory(size):
     """Fit and transform of all, in memory and from a memory map."""
-    print("| N | data | fit | above, x data | transform, each | above, x data |")
-    print("|---|---|---|---|---|---|")
-    for n in (1000, 5000, 20_000):
+    print_head("N, data", HEADER)
+    for n in (size // 20, size // 4, size):
         for mode in ("memory", "map"):
-            got = measure(FIT, bends(), mode, n, {})
-            print(f"| {n} | {mode} | {got}", flush=True)
+            print_row(f"{n}, {mode}", measured(size, mode, n))
 
 
-def sample():
-    """Fit of a sample of 500."""
-    print("| N | data | fit |")
-    print("|---|---|---|")
-    for n in (1000, 5000, 20_000):
-        for mode in ("memory", "map", "files"):
-            print(f"| {n} | {mode} | {measure(SAMPLE, bends(), mode, n, {})}", flush=True)
-
-
-def many():
-    """200,000 performances, a tenth of them different: 1000 maps at a time, and all files at once.
-
-    The result of all is 1221 MB.
-    """
-    print("| N | data | transform | each | above |")
-    print("|---|---|---|---|---|")
-    for mode in ("maps", "files"):
-        got = measure(MANY, bends(), mode, 200_000, {})
-        print(f"| 200,000 | {mode} | {got}", flush=True)
+def many(size):
+    print_head("N, data", HEADER)
+    cells = measured(size, "map", 10 * size, max_fit=500, at_once=AT_ONCE)
+    print_row(f"{10 * size}, maps", cells)
 
 
 def actions(n, seed):
@@ -147,27 +105,29 @@ def seconds_of(function):
     return time.process_time() - start
 
 
-def classes():
-    """Fit and predictions of the classifier, compared with all performances and with landmarks."""
-    print("| N | compared with | fit | one | a hundred, each | equal answers |")
-    print("|---|---|---|---|---|---|")
+def classes(size):
+    """Fit and predictions of the classifier."""
+    print_head("N, compared with", ["fit", "one", "a hundred, each", "equal answers"])
     X, y, people = actions(1000, 0)
     new = actions(100, 1)[0]
     for n in (250, 500, 1000):
-        found = []
+        answers = []
         for n_landmarks in (None, ActionClassifier().n_landmarks):
             model = ActionClassifier(n_landmarks=n_landmarks)
             fit = seconds_of(lambda model=model, n=n: model.fit(X[:n], y[:n], groups=people[:n]))
-            found.append(model.predict(new))
+            answers.append(model.predict(new))
             one = np.median([seconds_of(lambda m=model, x=x: m.predict([x])) for x in new[:20]])
             hundred = seconds_of(lambda model=model: model.predict(new)) / 100
-            same = np.mean(found[0] == found[-1])
-            row = f"{fit:.1f} s | {1e3 * one:.0f} ms | {1e3 * hundred:.0f} ms | {100 * same:.0f} %"
-            print(f"| {n} | {len(model.landmarks_)} | {row} |", flush=True)
+            same = np.mean(answers[0] == answers[-1])
+            cells = [f"{fit:.1f} s", f"{1e3 * one:.0f} ms", f"{1e3 * hundred:.0f} ms"]
+            print_row(f"{n}, {len(model.landmarks_)}", [*cells, f"{same:.0%}"])
 
 
 if __name__ == "__main__":
-    sections = {"memory": memory, "sample": sample, "many": many, "classes": classes}
-    for name in sys.argv[1:] or sections:
-        print(f"\n## {name}\n")
-        sections[name]()
+    sections = {"memory": memory, "many": many, "classes": classes}
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("sections", nargs="*", default=list(sections))
+    parser.add_argument("--size", type=int, default=20_000, help="bends that are made")
+    options = parser.parse_args()
+    for name in options.sections:
+        sections[name](options.size)

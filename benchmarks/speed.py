@@ -1,14 +1,11 @@
-"""Time and memory, side by side with peers, as Markdown tables (docs/speed.md).
+"""Time, side by side with other packages, as Markdown tables (docs/speed.md).
 
-Ours and the peers run in alternation, one thread each, the peers in an environment of their own;
-times are of the processor but for cold starts and the table of memory. Each figure is a median,
-each ratio a median of ratios within a round, with its quartiles.
+    pip install . dtaidistance aeon tslearn gdtw
+    python benchmarks/speed.py [--only pair,pairs]
 
-    python -m venv peers && peers/bin/pip install dtaidistance aeon tslearn gdtw fdasrsf affinewarp
-    python benchmarks/speed.py --peers peers/bin/python
-
-``--only pair,pairs`` runs some of the sections. What changes from one version to the next is timed
-by compare.py, and thousands of trials by scaling.py.
+Ours and the others run in turns on one thread; times are of the processor but for cold starts. Each
+figure is a median, each ratio a median of ratios within a round, with its quartiles. Packages that
+are not installed are left out. What changes from one version to the next is timed by compare.py.
 """
 
 import os
@@ -17,286 +14,229 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUM
     os.environ[_name] = "1"
 
 import argparse
+import contextlib
+import io
 import platform
 import subprocess
 import sys
-import tempfile
 import time
+import warnings
 from functools import partial
-from pathlib import Path
 
 import numpy as np
-import sklearn_motionsync
+from harness import print_head, print_row, print_versions
 from jobs import random_walks
 from sklearn_motionsync import DenseSynchronizer
 
-HERE = Path(__file__).resolve().parent
 PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
-FOLDER = Path(tempfile.mkdtemp(prefix="motionsync-speed-"))
+DEFAULTS, PAPERS = "defaults", "the paper's settings"
+PACKAGES = ("dtaidistance", "aeon", "tslearn", "gdtw")
+
+# -- the other packages: each gives a job on trials (n, n_frames, n_features) -------------
 
 
-# -- data and runners --------------------------------------------------------------------
+def dtaidistance_pairs(X):
+    from dtaidistance import dtw_ndim
+
+    window, trials = X.shape[1] // 4 + 1, list(X)
+    return lambda: dtw_ndim.distance_matrix_fast(trials, window=window, only_triu=True)
 
 
-def walks(n=40, n_frames=100, n_features=16):
-    """Random walks about a common mean, and their file."""
-    X, path = random_walks(n, n_frames, n_features), FOLDER / f"{n}-{n_frames}-{n_features}.npy"
-    np.save(path, X)
-    return X, path
+def dtaidistance_path(X, share=0.25):
+    from dtaidistance import dtw_ndim
+
+    window = int(X.shape[1] * share) + 1
+    return lambda: dtw_ndim.warping_path(X[0], X[1], window=window, use_c=True)
 
 
-def timed(function, clock=time.process_time):
-    """Seconds of one run: of the processor, which other work on the machine moves less."""
-    start = clock()
-    function()
-    return clock() - start
+def dtaidistance_average(X):
+    from dtaidistance import dtw_barycenter
+
+    trials = list(X)
+    return lambda: dtw_barycenter.dba_loop(trials, trials[0], max_it=10, use_c=True)
 
 
-class Peers:
-    """A process in the peers' environment."""
+def aeon_pairs(X):
+    from aeon.distances import dtw_pairwise_distance
 
-    def __init__(self, python):
-        self.python, self.process = python, None
-        if python:
-            self.process = subprocess.Popen(
-                [python, "-W", "ignore", str(HERE / "speed_peers.py")],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                text=True,
-            )
+    channels = np.ascontiguousarray(X.transpose(0, 2, 1))
+    return lambda: dtw_pairwise_distance(channels, window=0.25)
 
-    def __call__(self, job, path):
-        """Seconds of one run, or nan."""
-        if self.process is None:
-            return np.nan
-        self.process.stdin.write(f"{job}\t{path}\n")
-        self.process.stdin.flush()
-        answer = self.process.stdout.readline().strip()
+
+def aeon_path(X):
+    from aeon.distances import dtw_alignment_path
+
+    channels = np.ascontiguousarray(X.transpose(0, 2, 1))
+    return lambda: dtw_alignment_path(channels[0], channels[1], window=0.25)
+
+
+def tslearn_pairs(X):
+    from tslearn.metrics import cdist_dtw
+
+    return lambda: cdist_dtw(X, sakoe_chiba_radius=X.shape[1] // 4)
+
+
+def tslearn_path(X):
+    from tslearn.metrics import dtw_path
+
+    return lambda: dtw_path(X[0], X[1], sakoe_chiba_radius=X.shape[1] // 4)
+
+
+def gdtw_path(X):
+    import gdtw
+
+    def run():
+        solver = gdtw.GDTW()
+        solver.set_params({"x": X[0], "y": X[1], "t": np.linspace(0, 1, X.shape[1])})
+        return solver.run()
+
+    return run
+
+
+PATHS = {
+    "aeon path": aeon_path,
+    "tslearn path": tslearn_path,
+    "dtaidistance path": dtaidistance_path,
+    "gdtw path": gdtw_path,
+}
+MATRIX = "dtaidistance, upper half"
+PAIRS = {MATRIX: dtaidistance_pairs, "aeon": aeon_pairs, "tslearn": tslearn_pairs}
+AVERAGES = {"dtaidistance DBA": dtaidistance_average}
+
+
+def installed(makers, X):
+    """Jobs of the packages that can be imported, which print nothing."""
+    jobs = {}
+    for name, make in makers.items():
         try:
-            return float(answer)
-        except ValueError:
-            print(f"{job}: {answer}", file=sys.stderr)
-            return np.nan
+            jobs[name] = quiet(make(X))
+        except ImportError as error:
+            print(f"{name} is left out: {error}", file=sys.stderr)
+    return jobs
 
-    def versions(self):
-        """What is installed there."""
-        if not self.python:
-            return "no peers"
-        command = [self.python, "-W", "ignore", str(HERE / "speed_peers.py"), "versions"]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip(
-            ", "
-        )
+
+def quiet(function):
+    """A function whose output and warnings are not shown."""
+
+    def run():
+        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            function()
+
+    return run
 
 
 # -- tables --------------------------------------------------------------------------------
 
 
-def compare(title, jobs, rounds, against=None):
-    """Run jobs in alternation and print a table; ``jobs`` give seconds."""
-    names = list(jobs)
-    against = against or names[0]
-    seconds = {name: [] for name in names}
-    for job in jobs.values():
-        if rounds > 1:
-            job()
+def compare(title, jobs, rounds, against, clock=time.process_time):
+    """Run jobs in turns, and print the milliseconds of each and its ratio to one of them."""
+    for job in jobs.values() if rounds > 1 else ():
+        job()
+    seconds = {name: [] for name in jobs}
     for _ in range(rounds):
         for name, job in jobs.items():
-            seconds[name].append(job())
-    # Without peers there are no figures of theirs.
-    measured = {name: np.array(some) for name, some in seconds.items() if not np.isnan(some).all()}
-    against = against if against in measured else next(iter(measured))
-    print(f"\n## {title}\n\n| | ms | times {against} |\n|---|---|---|")
-    for name, values in measured.items():
-        base = measured[against]
-        low, middle, high = np.percentile(values / base, [25, 50, 75])
-        print(
-            f"| {name} | {1e3 * np.median(values):.4g} | {middle:.3g} ({low:.3g} to {high:.3g}) |"
-        )
-    sys.stdout.flush()
+            start = clock()
+            job()
+            seconds[name].append(clock() - start)
+    against = against if against in jobs else next(iter(jobs))
+    print_head(title, ["ms", f"times {against}"])
+    for name, values in seconds.items():
+        ratios = np.divide(values, seconds[against])
+        low, middle, high = np.percentile(ratios, [25, 50, 75])
+        median = f"{1e3 * np.median(values):.4g}"
+        print_row(name, [median, f"{middle:.3g} ({low:.3g} to {high:.3g})"])
 
 
-def fit(X, **settings):
-    """A job: fit."""
-    return lambda: timed(lambda: DenseSynchronizer(**settings).fit(X))
-
-
-def transform(sync, X):
-    """A job: transform."""
-    return lambda: timed(lambda: sync.transform(X))
-
-
-def pair(peers):
-    """One pair with its path, and one sequence to a fitted pattern."""
-    X, path = walks()
+def pair():
+    """One pair with its path, and one trial to a fitted template."""
+    X = random_walks()
     paper, ours = DenseSynchronizer(**PAPER).fit(X), DenseSynchronizer().fit(X)
     # Next to nothing to compute: what is left are calls.
-    two, one_frame = X[:, :, :2], {"max_offset": 1 / X.shape[1]}
-    bare = DenseSynchronizer(**one_frame).fit(two)
-    bare_paper = DenseSynchronizer(**PAPER, **one_frame).fit(two)
-    one, defaults = X[1:2], "`transform`, defaults"
+    bare = DenseSynchronizer(max_offset=1 / X.shape[1]).fit(X[:, :, :2])
+    base = "`transform`, defaults"
     jobs = {
-        "`transform`, the paper's settings": transform(paper, one),
-        "`transform`, defaults without consensus": transform(
-            DenseSynchronizer(consensus=0).fit(X), one
-        ),
-        defaults: transform(ours, one),
-        "the paper's settings, two features, one frame of offset": transform(bare_paper, two[1:2]),
-        "defaults, two features, one frame of offset": transform(bare, two[1:2]),
-        "one of 40 in `transform`, defaults": lambda: transform(ours, X)() / 40,
+        f"`transform`, {PAPERS}": lambda: paper.transform(X[1:2]),
+        base: lambda: ours.transform(X[1:2]),
+        "two features, one frame of offset": lambda: bare.transform(X[1:2, :, :2]),
+        f"`transform` of 40, {PAPERS}": lambda: paper.transform(X),
+        f"`transform` of 40, {DEFAULTS}": lambda: ours.transform(X),
     }
-    names = ("aeon path", "tslearn path", "dtaidistance path", "gdtw path")
-    jobs |= {name: partial(peers, name, path) for name in names}
-    compare("One pair of 100 x 16 with its path", jobs, 21, defaults)
-    slow = {defaults: transform(ours, one), "fdasrsf path": partial(peers, "fdasrsf path", path)}
-    compare("One pair, fdasrsf", slow, 5)
-    jobs = {
-        "`transform` of 40, the paper's settings": transform(paper, X),
-        "`transform` of 40, defaults": transform(ours, X),
+    compare("one pair of 100 x 16", jobs | installed(PATHS, X), 21, base)
+
+
+def pairs():
+    """All pairs of sets of several sizes."""
+    for n, n_frames, n_features in ((40, 100, 16), (10, 100, 16), (100, 100, 16), (40, 200, 60)):
+        X = random_walks(n, n_frames, n_features)
+        jobs = installed(PAIRS if n == 40 and n_frames == 100 else {MATRIX: PAIRS[MATRIX]}, X)
+        for kind, trials in (("float64", X), ("float32", X.astype(np.float32))):
+            jobs[f"`fit`, {PAPERS}, {kind}"] = partial(DenseSynchronizer(**PAPER).fit, trials)
+            jobs[f"`fit`, {DEFAULTS}, {kind}"] = partial(DenseSynchronizer().fit, trials)
+        title = f"all pairs of {n} trials of {n_frames} x {n_features}"
+        compare(title, jobs, 5 if n == 100 else 15, MATRIX)
+
+
+def whole():
+    """Template and all warps of a set, beside an average without warps."""
+    X, base = random_walks(), f"`fit_transform`, {DEFAULTS}"
+    ours = {
+        f"`fit_transform`, {PAPERS}": partial(DenseSynchronizer(**PAPER).fit_transform, X),
+        base: partial(DenseSynchronizer().fit_transform, X),
     }
-    compare("Forty trials to a fitted template of 100 x 16", jobs, 21)
+    title = "template and all warps of 40 trials of 100 x 16"
+    compare(title, ours | installed(AVERAGES, X), 11, base)
 
 
-def pairs(peers, title, rounds=15, **size):
-    """All pairs of a set."""
-    X, path = walks(**size)
-    jobs = {"dtaidistance, upper half": partial(peers, "dtaidistance pairs", path)}
-    for kind, some in (("float64", X), ("float32", X.astype(np.float32))):
-        jobs[f"`fit`, the paper's settings, {kind}"] = fit(some, **PAPER)
-        jobs[f"`fit`, defaults, {kind}"] = fit(some)
-    if X.shape == (40, 100, 16):
-        jobs |= {name: partial(peers, f"{name} pairs", path) for name in ("aeon", "tslearn")}
-    compare(title, jobs, rounds)
-
-
-def whole(peers):
-    """Pattern and all warps of a set."""
-    X, path = walks()
-    base, ours = "`fit_transform`, defaults", {}
-    for name, settings in (("the paper's settings", PAPER), ("defaults", {})):
-        make = partial(DenseSynchronizer, **settings)
-        ours[f"`fit_transform`, {name}"] = partial(timed, lambda make=make: make().fit_transform(X))
-    title = "The whole job: template and all warps of 40 trials of 100 x 16"
-    for names, rounds in (
-        (("dtaidistance DBA", "tslearn DBA", "aeon DBA"), 11),
-        (("affinewarp fit", "fdasrsf Karcher mean"), 3),
-    ):
-        jobs = {**ours, **{name: partial(peers, name, path) for name in names}}
-        compare(title, jobs, rounds, base)
-    print("\nDBA gives a mean, 10 iterations, without the warps.")
-
-
-def cold(peers):
-    """Import and first result in a new process."""
-    _, path = walks()
+def cold():
+    """From the start of a new process to its first result."""
     ours = (
-        "import sys, numpy; from sklearn_motionsync import DenseSynchronizer;"
-        "DenseSynchronizer().fit_transform(numpy.load(sys.argv[1]))"
+        "import numpy; from sklearn_motionsync import DenseSynchronizer;"
+        "DenseSynchronizer().fit_transform(numpy.random.default_rng(0).random((40, 100, 16)))"
     )
-    base = (
+    needed = (
         "import sklearn.decomposition, sklearn.pipeline, sklearn.utils.parallel, pandas,"
         "scipy.signal, scipy.interpolate"
     )
-
-    def run(*command):
-        subprocess.run(command, check=True, capture_output=True)
-
-    jobs = {
-        "ours, defaults, template and all warps": [sys.executable, "-c", ours, str(path)],
-        "`import sklearn_motionsync`": [sys.executable, "-c", "import sklearn_motionsync"],
-        "importing what it needs of scikit-learn, pandas, scipy": [sys.executable, "-c", base],
+    base = "template and all warps, defaults"
+    commands = {
+        base: ["-c", ours],
+        "`import sklearn_motionsync`": ["-c", "import sklearn_motionsync"],
+        "importing what it needs of scikit-learn, pandas, SciPy": ["-c", needed],
     }
-    if peers.python:
-        server = [peers.python, "-W", "ignore", str(HERE / "speed_peers.py")]
-        names = ("dtaidistance DBA", "tslearn path", "tslearn DBA", "aeon path", "aeon DBA")
-        names += ("gdtw path", "fdasrsf path", "affinewarp fit")
-        jobs |= {name: [*server, name, str(path)] for name in names}
-    clock = time.perf_counter
-    table = {name: partial(timed, partial(run, *job), clock) for name, job in jobs.items()}
-    compare("Cold start: a new process to its first result", table, rounds=3)
+    run = partial(subprocess.run, check=True, capture_output=True)
+    jobs = {name: partial(run, [sys.executable, *rest]) for name, rest in commands.items()}
+    compare("a new process to its first result", jobs, 3, base, time.perf_counter)
 
 
-MEASURE = """
-import sys, time
-import numpy as np
-from sklearn_motionsync import DenseSynchronizer
-def peak():
-    with open("/proc/self/status") as status:
-        return int(next(line for line in status if line.startswith("VmHWM")).split()[1])
-X = np.load(sys.argv[1])
-before = peak()
-start = time.perf_counter()
-sync = DenseSynchronizer({settings}).fit(X)
-fitted = time.perf_counter()
-sync.transform(X)
-after = peak()
-print(fitted - start, time.perf_counter() - fitted, after / 1024, before / 1024)
-"""
-
-
-def measure(path, settings):
-    """Seconds of fit and transform and peak memory of a process of its own."""
-    code = MEASURE.format(settings=", ".join(f"{k}={v!r}" for k, v in settings.items()))
-    command = [sys.executable, "-c", code, str(path)]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
-
-
-def long(peers):
+def long():
     """Two takes of 20,000 frames."""
-    rng = np.random.default_rng(0)
-    n_frames = 20_000
-    t = np.linspace(0, 1, n_frames)
-    knots = np.linspace(0, 1, 400)
+    rng, n_frames = np.random.default_rng(0), 20_000
+    t, knots = np.linspace(0, 1, n_frames), np.linspace(0, 1, 400)
     curve = np.column_stack([np.interp(t, knots, rng.standard_normal(400)) for _ in range(16)])
     warp = t + 0.02 * np.sin(2 * np.pi * t)
-    other = np.column_stack([np.interp(warp, t, c) for c in curve.T])
+    other = np.column_stack([np.interp(warp, t, column) for column in curve.T])
     X = np.stack([curve, other]) + 0.05 * rng.standard_normal((2, n_frames, 16))
-    path = FOLDER / "long.npy"
-    np.save(path, X)
-    given = {"pattern": 0, "max_offset": 0.05}
-    jobs = {
-        "dtaidistance long path": partial(peers, "dtaidistance long path", path),
-        "`fit` and `match`, the paper's settings": lambda: timed(
-            lambda: DenseSynchronizer(**given, **PAPER).fit(X).match(X[1:])
-        ),
-        "`fit` and `match`, defaults": lambda: timed(
-            lambda: DenseSynchronizer(**given).fit(X).match(X[1:])
-        ),
-    }
-    compare("Two takes of 20,000 frames x 16, `max_offset=0.05`", jobs, rounds=3)
-    print("\n| settings | fit, s | transform of both, s | peak MB |\n|---|---|---|---|")
-    for name, settings in (("paper", PAPER), ("defaults", {})):
-        got = list(map(float, measure(path, {**given, **settings})[:3]))
-        print(f"| {name} | {got[0]:.2f} | {got[1]:.2f} | {got[2]:.0f} |", flush=True)
+    band, base = {"pattern": 0, "max_offset": 0.05}, "dtaidistance path"
+    settings = {PAPERS: band | PAPER, DEFAULTS: band}
+    jobs = installed({base: partial(dtaidistance_path, share=0.05)}, X)
+    for name, chosen in settings.items():
+        sync = DenseSynchronizer(**chosen)
+        jobs[f"`fit` and `match`, {name}"] = lambda sync=sync: sync.fit(X).match(X[1:])
+    compare("two takes of 20,000 frames x 16, `max_offset=0.05`", jobs, 3, base)
 
 
-SECTIONS = {
-    "pair": pair,
-    "pairs": partial(pairs, title="All pairs of 40 trials of 100 x 16"),
-    "n10": partial(pairs, title="All pairs of 10 trials", n=10),
-    "n100": partial(pairs, title="All pairs of 100 trials", n=100, rounds=5),
-    "frames": partial(pairs, title="All pairs of 40 trials of 200 x 16", n_frames=200),
-    "features": partial(pairs, title="All pairs of 40 trials of 100 x 60", n_features=60),
-    "whole": whole,
-    "cold": cold,
-    "long": long,
-}
+SECTIONS = {"pair": pair, "pairs": pairs, "whole": whole, "cold": cold, "long": long}
 
 
 def main():
-    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--peers", help="the Python of the peers' environment")
     parser.add_argument("--only", help="sections, separated by commas", default=",".join(SECTIONS))
     options = parser.parse_args()
-    peers = Peers(options.peers)
-    print(
-        f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, NumPy "
-        f"{np.__version__}, sklearn_motionsync {sklearn_motionsync.__version__}; "
-        f"{peers.versions()}."
-    )
+    print(f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
+    print_versions(*PACKAGES)
     for name in options.only.split(","):
-        SECTIONS[name](peers)
+        SECTIONS[name]()
 
 
 if __name__ == "__main__":

@@ -84,22 +84,16 @@ def test_constants_are_switched_and_come_back(constants):
             assert one.value == before
 
 
-def test_a_default_and_a_number_of_a_tuple_are_switched(constants):
+def test_a_default_is_switched(constants):
     one = constants.Constant(constants.PARAMETERS, "consensus", "")
     with one.switched(3):
         assert DenseSynchronizer().consensus == 3
     assert DenseSynchronizer().consensus == 8
-    of_tuple = constants.Constant("matching.tile", "SMALL_BYTES", "", index=1)
-    (whole,) = [getattr(module, of_tuple.name) for module in of_tuple.modules]
-    with of_tuple.switched(0.5):
-        (now,) = [getattr(module, of_tuple.name) for module in of_tuple.modules]
-        assert now == (whole[0], 0.5, *whole[2:])
 
 
 def test_halves_and_doubles(constants):
     assert constants.scaled(0.3, 0.5) == 0.15
     assert [constants.scaled(n, 0.5) for n in (1, 7, 8)] == [1, 3, 4]
-    assert constants.scaled((0.25, 3), 2) == (0.5, 6)
 
 
 def test_a_switched_constant_changes_warps_and_leaves_nothing_behind(constants):

@@ -111,4 +111,4 @@ def test_number_of_real_events_is_the_documented_one(real_data):
         shown = [int(np.isfinite(at).sum()) for at in action.moments.values()]
         found[action.name] = len(action.data), shown
     assert found == CLIPS
-    assert sum(bool(event.peers) for event in events.EVENTS) == 16
+    assert sum(event.chosen for event in events.EVENTS) == 16

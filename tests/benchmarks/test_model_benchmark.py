@@ -87,9 +87,8 @@ def test_summary_figures_are_means_over_actions(model):
     }
     assert model.accepted(actions) == {"a": 0.75, "b": 1.0, "bending": 0.5}
     assert model.refused(actions, "backwards") == pytest.approx((0.5 + 0) / 2)
-    assert model.refused(actions, "backwards", model.BENDS) == 0.5
+    assert model.refused(actions, "backwards", model.THERE_AND_BACK) == 0.5
     assert np.isnan(model.refused(actions, "other actions"))
-    assert model.areas(actions, "backwards") == [6 / 8, 1 / 2]
 
 
 def test_all_tables_of_a_tiny_set(model, clips, capsys, monkeypatch):

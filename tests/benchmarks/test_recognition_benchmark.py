@@ -118,7 +118,7 @@ def test_benchmarked_pipeline_is_that_of_the_manual(recognition, bunch, recordin
     groups = bunch.actor[train]
     pipe.fit([bunch.data[i] for i in train], bunch.target[train], actionclassifier__groups=groups)
     expected = -pipe.score_samples([bunch.data[i] for i in test])
-    one = recognition.Classifier(recordings, recognition.BOTH)
+    one = recognition.Classifier(recordings, view=recognition.BOTH)
     np.testing.assert_allclose(one.novelty(train, test), expected, rtol=1e-6)
     np.testing.assert_array_equal(one.predict(train, test), bunch.target[test])
 
@@ -128,13 +128,8 @@ def test_benchmarked_pipeline_is_that_of_the_manual(recognition, bunch, recordin
 
 def test_all_tables_of_a_tiny_set_without_peers(recognition, recordings, capsys, monkeypatch):
     hasty = partial(ActionClassifier, ["posture"], n_frames=12)
-    short = [
-        (way, views[:1], (lengths[0] and 12,), package)
-        for way, views, lengths, package in recognition.WAYS
-    ]
     monkeypatch.setattr(recognition, "version_of", lambda package: None)
     monkeypatch.setattr(recognition, "ActionClassifier", hasty)
-    monkeypatch.setattr(recognition, "WAYS", short)
     splits = recognition.actors_left_out(recordings.actors)[:1]
     two = recordings.actors != "s03"
     few = recognition.Recordings(
@@ -144,7 +139,7 @@ def test_all_tables_of_a_tiny_set_without_peers(recognition, recordings, capsys,
         recordings.actors[two],
     )
     with threadpool_limits(1), parallel_config(backend="sequential"):
-        recognition.action_table(recordings, few, splits)
+        recognition.recognition_table(recordings, splits)
         recognition.rejection_tables(recordings, few, splits)
     tables = capsys.readouterr().out.strip().split("\n\n")
     rows = [[line.strip("| ").split(" | ") for line in table.splitlines()] for table in tables]
