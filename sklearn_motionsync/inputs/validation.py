@@ -215,7 +215,7 @@ def check_performances(
             + (_EXCHANGED if {len(x) for x in out} == {estimator.n_features_in_} else "")
         )
     if reset:
-        _check_names(estimator, sequences[0], reset)
+        vars(estimator)[_NAMES] = column_names(sequences[0])
     named = out.names is not None and any([isinstance(name, str) for name in out.names])
     # Arrays were checked above, all but those given after a fit on tables.
     if reset or named or hasattr(estimator, "feature_names_in_"):
@@ -237,14 +237,6 @@ def check_performances(
 def names_of_input(estimator):
     """Names of the features that an estimator was fitted on, of any type; None without any."""
     return vars(estimator).get(_NAMES)
-
-
-def _check_names(estimator, x, reset):
-    """Hold names of any type against those of fit, as scikit-learn does with text."""
-    if reset:
-        vars(estimator)[_NAMES] = column_names(x)
-    else:
-        check_names(x, names_of_input(estimator), "The input")
 
 
 def check_transformed(estimator, X, names, *, finite=True):
@@ -332,7 +324,10 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
     out = validate_data(
         estimator, X, reset=reset, dtype=list(FLOATS), order="C", ensure_all_finite=False
     )
-    _check_names(estimator, X, reset)
+    if reset:
+        vars(estimator)[_NAMES] = column_names(X)
+    else:
+        check_names(X, names_of_input(estimator), "The input")
     names = getattr(estimator, "feature_names_in_", None)
     labels = index if index is not None else numbers
     advice = getattr(estimator, "_on_gaps", None)

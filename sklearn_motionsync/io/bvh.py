@@ -27,14 +27,12 @@ def read_bvh(path):
     text.check_size(len(values), len(joints))
     parents = [joint.parent for joint in joints]
     offsets = np.array([joint.offset for joint in joints]).T[:, :, None]
+    channels = [
+        [f"{name[:1].decode()}{name[1:].decode().lower()}" for name in joint.channels or ()]
+        for joint in joints
+    ]
     (axes, moved, columns), turning = split_channels(
-        [
-            [
-                ("t" if name.endswith(b"POSITION") else "r", name[:1].decode())
-                for name in joint.channels or ()
-            ]
-            for joint in joints
-        ]
+        [[("t" if name.endswith("position") else "r", name[0]) for name in of] for of in channels]
     )
 
     def translations(values):
@@ -42,10 +40,6 @@ def read_bvh(path):
         result[axes, moved] = values[:, columns].T
         return result
 
-    channels = [
-        [f"{name[:1].decode()}{name[1:].decode().lower()}" for name in joint.channels or ()]
-        for joint in joints
-    ]
     return {
         "joints": make_unique([joint.name for joint in joints]),
         "parents": parents,
@@ -54,10 +48,7 @@ def read_bvh(path):
         "units": None,
         "up": "y",
         "kind": "joints",
-        "rig": {
-            "offsets": offsets[:, :, 0].T.tolist(),
-            "channels": channels,
-        },
+        "rig": {"offsets": offsets[:, :, 0].T.tolist(), "channels": channels},
     }
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from ..body.axes import UP_AXES
-from ..body.skeleton import Skeleton
+from ..body.skeleton import Skeleton, parse_joint_columns
 from ..inputs.collections import check_members
 from ..inputs.facts import units_of_columns
 from ..inputs.numbers import as_numbers, check_finite
@@ -130,20 +130,10 @@ def _read_positions(X, skeleton, path):
     if skeleton is None:
         if not isinstance(X, pd.DataFrame):
             raise ValueError(f"{path}: an array does not name its joints: give a skeleton.")
-        names = [str(name)[:-2] for name in X.columns[::3]]
-        expected = [f"{name}_{axis}" for name in names for axis in "xyz"]
-        if [str(name) for name in X.columns] != expected:
-            raise ValueError(
-                f"{path}: columns must be <joint>_x, <joint>_y, <joint>_z, joint by joint; got "
-                f"{[str(name) for name in X.columns][:6]}."
-            )
-        joints, parents, up = (
-            X.attrs.get("joints"),
-            X.attrs.get("parents"),
-            X.attrs.get("up") or "y",
-        )
-        same = joints is not None and list(joints) == names
-        parents = list(parents) if same else Skeleton.from_frame(X).parents
+        names, _ = parse_joint_columns(X)
+        is_known = list(X.attrs.get("joints") or ()) == names
+        parents = X.attrs["parents"] if is_known else Skeleton.from_frame(X).parents
+        up = X.attrs.get("up") or "y"
     else:
         names, parents, up = list(skeleton.joints), skeleton.parents, skeleton.up
     if x.shape[1] != 3 * len(names):

@@ -10,7 +10,7 @@ from sklearn_motionsync import Skeleton
 from sklearn_motionsync.datasets import load_performances
 
 import fuzz_readers
-from damaged_archives import archive, fields, npy
+from damaged_archives import archive, fields, make_archives, npy
 
 
 def replaced(name, place, value, dtype=None):
@@ -174,8 +174,7 @@ def test_archives_that_unpack_to_very_much_are_refused_before(tmp_path):
 
 
 def test_damaged_archives_are_read_or_refused(tmp_path):
-    """A short run of tests/io/fuzz_readers.py."""
-    originals = fuzz_readers.load_originals("archives")
+    originals = [{"a.npz": content} for content in make_archives()]
     outcomes = [
         fuzz_readers.run_case(fuzz_readers.damaged(originals, 0, number), tmp_path)
         for number in range(100)

@@ -86,7 +86,6 @@ def test_every_reader_takes_its_ending_in_capitals_and_line_ends_of_windows(tmp_
 
 @pytest.mark.parametrize("ending", [ending for ending in READERS if ending in DAMAGES])
 def test_damaged_files_are_read_or_refused(tmp_path, ending):
-    """A short run of fuzz_readers.py on the example."""
     originals = [EXAMPLES[ending]()]
     outcomes = {
         fuzz_readers.run_case(fuzz_readers.damaged(originals, 0, number), tmp_path)
