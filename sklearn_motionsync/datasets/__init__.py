@@ -2,8 +2,7 @@
 
 from .archive import load_performances
 from .bending import make_bending
-from .cmu import fetch_cmu
 from .gait import make_gait
 from .walk import make_walk
 
-__all__ = ["fetch_cmu", "load_performances", "make_bending", "make_gait", "make_walk"]
+__all__ = ["load_performances", "make_bending", "make_gait", "make_walk"]
