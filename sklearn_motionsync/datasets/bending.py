@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from numbers import Integral
+from numbers import Integral, Real
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -11,11 +11,17 @@ from sklearn.utils._param_validation import Interval
 
 from ..body.skeleton import Skeleton
 from ..inputs.types import RandomState
-from ..inputs.wording import counted
 from ..matching.counting import whole
 from ..utils.parameters import validated_function
-from .limits import LIMITS, check_size
 
+# Ranges of the parameters that all makers of data have.
+LIMITS = {
+    "style": [Interval(Real, 0, 100, closed="both")],
+    "warp": [Interval(Real, 0, 10, closed="both")],
+    "noise": [Interval(Real, 0, 1000, closed="both")],
+    "frame_rate": [Interval(Real, 0.001, 10**9, closed="both")],
+    "random_state": ["random_state"],
+}
 # The five moments, as shares of the action.
 _KEYFRAMES = {
     "starts to bend": 0.12,
@@ -122,7 +128,7 @@ def make_bending(
     Raises
     ------
     ValueError
-        If a parameter is out of its range, or the performances would take more than 16 GB.
+        If a parameter is out of its range.
 
     See Also
     --------
@@ -135,9 +141,6 @@ def make_bending(
     >>> [x.shape[1] for x in bunch.data], bunch.keyframes.shape
     ([45, 45, 45], (3, 5))
     """
-    amount = f"{counted(n_performances, 'performance')} of about {n_frames} frames"
-    n_numbers = n_performances * n_frames * 45
-    check_size("make_bending", amount, n_numbers, "n_performances or n_frames")
     rng = check_random_state(random_state)
     actors = [_draw_actor(rng, style) for _ in range(n_actors)]
     moments = np.array(list(_KEYFRAMES.values()))

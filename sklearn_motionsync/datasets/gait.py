@@ -11,10 +11,9 @@ from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval
 
 from ..inputs.types import RandomState
-from ..inputs.wording import counted
 from ..matching.counting import whole
 from ..utils.parameters import validated_function
-from .limits import LIMITS, check_size
+from .bending import LIMITS
 
 _GROUPS = ("A", "B")
 _UNITS = ("degrees", "degrees", "degrees", "body weights")
@@ -158,7 +157,7 @@ def make_gait(
     Raises
     ------
     ValueError
-        If a parameter is out of its range, or the cycles would take more than 16 GB.
+        If a parameter is out of its range.
 
     See Also
     --------
@@ -174,9 +173,6 @@ def make_gait(
     >>> later[[0, 30, 62, 100]].round(1).tolist()  # in per cent of the cycle
     [0.0, 0.8, 3.0, 0.0]
     """
-    amount = f"{n_people} people with {counted(n_cycles, 'cycle')} of about {n_frames} frames"
-    n_numbers = n_people * n_cycles * n_frames * len(_CURVES)
-    check_size("make_gait", amount, n_numbers, "n_people, n_cycles or n_frames")
     # The same people walk, in cycles and in takes.
     seeds = check_random_state(random_state).randint(np.iinfo(np.int32).max, size=n_people)
     record = _record_take if takes else _record_cycles

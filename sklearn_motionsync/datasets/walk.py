@@ -14,9 +14,8 @@ from sklearn.utils._param_validation import Interval
 from ..body.formats import SIDES
 from ..body.skeleton import Skeleton
 from ..inputs.types import RandomState
-from ..inputs.wording import counted
 from ..utils.parameters import validated_function
-from .limits import LIMITS, check_size
+from .bending import LIMITS
 
 _ENDS = [f"{side}_{end}" for side in SIDES for end in ("heel", "toe")]
 # An average body: metres, seconds, and shares of a stride or of the leg.
@@ -114,7 +113,7 @@ def make_walk(
     Raises
     ------
     ValueError
-        If a parameter is out of its range, or the recordings would take more than 16 GB.
+        If a parameter is out of its range.
 
     See Also
     --------
@@ -133,8 +132,6 @@ def make_walk(
     >>> [(event["label"], event["context"]) for event in walk.events[0][:4]]
     [('Foot Strike', 'Right'), ('Foot Off', 'Left'), ('Foot Strike', 'Left'), ('Foot Off', 'Right')]
     """
-    amount = f"{n_people} people with {counted(n_strides, 'stride')}"
-    check_size("make_walk", amount, 57 * 2 * n_people * n_strides * frame_rate, "n_people")
     seeds = check_random_state(random_state).randint(np.iinfo(np.int32).max, size=n_people)
     data, events, gaits = [], [], []
     for seed in seeds:

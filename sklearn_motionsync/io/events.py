@@ -32,7 +32,7 @@ from ..inputs.tables import (
     name_performance,
 )
 from ..inputs.types import PerformancesLike, Table, ValuesLike
-from ..inputs.wording import counted, within
+from ..inputs.wording import within
 from ..matching.counting import whole
 
 __all__ = [
@@ -311,7 +311,6 @@ def keyframes_from_events(
     events: Table | None = None,
     names: Sequence[str | tuple[str, str]] | None = None,
     *,
-    by: str | Sequence[str] | None = None,
     frame_rate: float | ValuesLike | None = None,
 ) -> pd.DataFrame:
     """Turn the events of trials into key-frames, one row a trial and one column an event.
@@ -323,17 +322,15 @@ def keyframes_from_events(
     X : list of arrays (n_frames_i, n_features), 3-D array, 2-D array or DataFrame
         The trials, as the synchronizer takes them.
     events : DataFrame of pandas or polars, default=None
-        One row an event, in any order: columns with the label of the trial, such as ``subject`` and
-        ``trial``, the column ``event`` (or ``label``, and perhaps ``context``), and the time in
-        ``frame`` or in ``seconds`` (or ``time``, ``t``, ``time (s)``). Case is ignored. If both are
-        there, ``frame`` counts. A row whose time is NaN is left out. By default events are those of
+        One row an event, in any order: columns with the label of the trial, which are called like
+        its levels, such as ``subject`` and ``trial`` (or ``trial`` if there is one level); the
+        column ``event`` (or ``label``, and perhaps ``context``); and the time in ``frame`` or in
+        ``seconds`` (or ``time``, ``t``, ``time (s)``). Case is ignored. If both are there,
+        ``frame`` counts. A row whose time is NaN is left out. By default events are those of
         ``attrs["events"]`` of the trials, as `read_motion` and `cut_at_events` leave them.
     names : sequence of str or (str, str), default=None
         The events to take, in order of time: a label, or label and context, such as ``("Foot Off",
         "Left")``. Case is ignored. By default all.
-    by : str or list of str, default=None
-        The columns of ``events`` with the label of the trial, in the order of its levels. By
-        default those with the names of the levels, or ``trial`` if there is one level.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames per second of X, for seconds; by default what tables tell.
 
@@ -401,7 +398,7 @@ def keyframes_from_events(
         listed = [_events_of(x, trial) for x, trial in zip(sequences, trials, strict=True)]
         clocks = [frames_of_rows(x) for x in sequences]
     else:
-        listed, in_seconds = _events_in(events, labels, levels[:-1], by)
+        listed, in_seconds = _events_in(events, labels, levels[:-1])
         clocks = [frames_of_rows(x) for x in sequences]
         if in_seconds:
             rates = _rates_of(sequences, trials, frame_rate)
@@ -440,7 +437,7 @@ def _events_of(x, trial):
     return [(e["label"], e.get("context"), e["frame"]) for e in _read_events(x, trial)]
 
 
-def _events_in(events, labels, levels, by):
+def _events_in(events, labels, levels):
     """The events of each trial in a table, and whether their times are seconds."""
     table = as_pandas(events)
     if not isinstance(table, pd.DataFrame):
@@ -450,7 +447,7 @@ def _events_in(events, labels, levels, by):
     if any(name is not None for name in table.index.names):
         table = table.reset_index()
     columns = {str(name).strip().casefold(): name for name in table.columns[::-1]}
-    keys = _keys(columns, levels, by)
+    keys = _keys(columns, levels)
     label = next((columns[name] for name in _EVENTS if name in columns), None)
     frame = next((columns[name] for name in _FRAMES if name in columns), None)
     second = next((columns[name] for name in columns if names_seconds(name)), None)
@@ -481,17 +478,8 @@ def _events_in(events, labels, levels, by):
     return listed, frame is None
 
 
-def _keys(columns, levels, by):
+def _keys(columns, levels):
     """The columns of a table of events with the labels of trials."""
-    if by is not None:
-        by = [by] if isinstance(by, str) else list(by)
-        missing = [name for name in by if name not in columns.values()]
-        if missing or len(by) != len(levels):
-            raise ValueError(
-                f"by={by!r} must name {counted(len(levels), 'column')} of events, for the levels "
-                f"{list(levels)} of the labels of X; columns are {list(columns.values())[::-1]}."
-            )
-        return by
     wanted = [[str(level).strip().casefold()] for level in levels]
     if len(levels) == 1:
         wanted[0] += _TRIALS
@@ -499,7 +487,8 @@ def _keys(columns, levels, by):
     if None in keys:
         raise ValueError(
             f"events: there is no column {levels[keys.index(None)]!r}, a level of the labels of X; "
-            f"there are {list(columns.values())[::-1]}. Name those of the trial: by=[...]."
+            f"there are {list(columns.values())[::-1]}. Rename those of the trial: "
+            "events.rename(columns={...})."
         )
     return keys
 

@@ -32,8 +32,8 @@ _TASKS = 100
 def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
     """Yield ``function(*common, *portion)`` for every portion, in order.
 
-    A generator that is closed early, or interrupted, waits for the portions that other threads have
-    begun.
+    Where the generator is closed early, or interrupted, other threads end the portions that they
+    have begun.
 
     Parameters
     ----------
@@ -52,25 +52,16 @@ def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
     step : callable, default=None
         Called after every portion.
     """
-    running = _RunningCalls()
-    results = _results(function, portions, common, n_jobs, prefer, running)
-    try:
-        for result in results:
-            if step is not None:
-                step()
-            yield result
-    finally:
-        try:
-            results.close()
-        finally:
-            running.wait()
+    for result in _results(function, portions, common, n_jobs, prefer):
+        if step is not None:
+            step()
+        yield result
 
 
-def _results(function, portions, common, n_jobs, prefer, running):
+def _results(function, portions, common, n_jobs, prefer):
     if len(portions) < 2 or effective_n_jobs(n_jobs) == 1:
         return (_call_portion(function, *common, *portion) for portion in portions)
     backend, _ = get_active_backend(prefer=prefer)
-    call = running.call if getattr(backend, "supports_sharedmem", False) else _call_portion
     client = getattr(backend, "client", None)
     if common and hasattr(client, "scatter"):
         # Dask would forget a value whose key is made of its content if two tasks send it.
@@ -78,9 +69,7 @@ def _results(function, portions, common, n_jobs, prefer, running):
     # scikit-learn's own Parallel has threads that restore each other's warning filters. Other
     # threads have a configuration of their own, so each call is given that of this thread.
     config = get_config()
-    tasks = (
-        delayed(_call_configured)(config, call, function, *common, *portion) for portion in portions
-    )
+    tasks = (delayed(_call_configured)(config, function, *common, *portion) for portion in portions)
     try:
         parallel = Parallel(n_jobs=n_jobs, prefer=prefer, return_as="generator")
     except ValueError:
@@ -89,45 +78,14 @@ def _results(function, portions, common, n_jobs, prefer, running):
     return parallel(tasks)
 
 
-def _call_configured(config, call, *arguments):
+def _call_configured(config, *arguments):
     with config_context(**config):
-        return call(*arguments)
+        return _call_portion(*arguments)
 
 
 def _call_portion(function, *arguments):
     with one_blas_thread():
         return function(*arguments)
-
-
-class _RunningCalls:
-    """The calls that other threads have begun, which go on after an interruption."""
-
-    def __init__(self):
-        self._threads, self._closed = set(), False
-        # Used as a context by itself: an interruption leaves the lock either held or free.
-        self._lock = threading.RLock()
-        self._changed = threading.Condition(self._lock)
-
-    def call(self, function, *arguments):
-        """``function(*arguments)``; None once closed."""
-        thread = threading.get_ident()
-        try:
-            with self._lock:
-                if self._closed:
-                    return None
-                self._threads.add(thread)
-            return _call_portion(function, *arguments)
-        finally:
-            with self._lock:
-                self._threads.discard(thread)
-                self._changed.notify_all()
-
-    def wait(self):
-        """Close, and wait for the calls of other threads."""
-        with self._lock:
-            self._closed = True
-            own = {threading.get_ident()}
-            self._changed.wait_for(lambda: self._threads <= own)
 
 
 # -- linear algebra on one thread --------------------------------------------------------

@@ -59,8 +59,3 @@ def test_treadmill_and_seeds():
     assert way[1] < 0.1
     a, b = (make_walk(1, random_state=3).data[0] for _ in range(2))
     np.testing.assert_array_equal(a, b)
-
-
-def test_refused():
-    with pytest.raises(ValueError, match="make_walk makes up to 16 GB"):
-        make_walk(10**6, 10**5)

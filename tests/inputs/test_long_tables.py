@@ -742,32 +742,3 @@ def test_tables_of_spikes_are_refused():
         df = pd.DataFrame({"trial": 1, "unit": 3, "spike_time": time})
         with pytest.raises(ValueError, match=rf"{message}.*such as spikes, become rates first"):
             to_sequences(df, by=["trial", "unit"], time="spike_time")
-
-
-@pytest.mark.parametrize(
-    ("lost", "message"), [(0.0, None), (0.1, "has a gap"), (0.25, "has a gap")]
-)
-def test_whole_numbers_of_frames_are_no_events(lost, message):
-    """A converter counts in whole numbers; some of its frames are lost."""
-    rng = np.random.default_rng(0)
-    time = np.arange(300) / 100
-    df = pd.DataFrame({"trial": 1, "time": time, "force": rng.integers(0, 4096, 300)})
-    kept = df[np.r_[True, rng.uniform(size=298) >= lost, True]]
-    if message is None:
-        assert to_sequences(kept, by="trial", time="time")[0].shape == (300, 1)
-    else:
-        with pytest.raises(ValueError, match=message):
-            to_sequences(kept, by="trial", time="time")
-    assert to_sequences(kept, by="trial", time="time", max_gap_time=1)[0].shape == (300, 1)
-    assert to_sequences(kept, by="trial")[0].shape == (len(kept), 2)
-
-
-def test_whole_numbers_of_several_recordings_are_no_events():
-    """A key is missing in by=: the advice is to name it."""
-    parts = [
-        pd.DataFrame({"subject": k, "time": np.arange(n) / 50, "count": np.arange(n) % 7})
-        for k, n in enumerate([80, 95, 120])
-    ]
-    df = pd.concat(parts).assign(trial=1)
-    with pytest.raises(ValueError, match=r"come twice.*Name in by= all columns"):
-        to_sequences(df, by="trial", time="time")

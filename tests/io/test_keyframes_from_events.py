@@ -85,8 +85,6 @@ def test_arrays_are_numbered(make):
         found = keyframes_from_events(X, events)
         np.testing.assert_array_equal(found["apex"], [30.5, np.nan, 40])
         assert found.index.to_list() == [0, 1, 2]
-    mine = events.rename(columns={"performance": "rep"})
-    pd.testing.assert_frame_equal(keyframes_from_events(X, mine, by="rep"), found)
     contexts = events.assign(context=["Left", None])
     assert set(keyframes_from_events(X, contexts).columns) == {("apex", "Left"), "apex"}
 
@@ -162,8 +160,6 @@ def test_bad_tables_are_refused(name):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"by": "subject"}, "must name 2 columns of events, for the levels"),
-        ({"by": ["subject", "rep"]}, "must name 2 columns"),
         ({"names": ["apex"]}, r"No trial has the event 'apex' .*; there are \['"),
         ({"names": [3]}, "each of names must be the label of an event, or a pair .*, got 3"),
     ],

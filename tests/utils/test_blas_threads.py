@@ -1,11 +1,6 @@
 """One thread for the linear algebra of a portion; afterwards the process is as before."""
 
-import gc
-import os
-import signal
-import sys
 import threading
-import time
 
 import pytest
 import threadpoolctl
@@ -102,63 +97,3 @@ def test_other_threads_can_set_threads_afterwards(found):
         pass
     in_thread(threadpoolctl.threadpool_limits, 3, "blas")
     assert set(blas_threads().values()) == {3}
-
-
-# -- interruption -----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("n_jobs", [1, 2])
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
-def test_error_in_a_portion_waits_for_other_threads(found, n_jobs, error):
-    at_work = threading.Event()
-
-    def portion(i):
-        if i == 0:
-            if n_jobs == 2:
-                assert at_work.wait(10)
-            raise error
-        at_work.set()
-        time.sleep(0.3)
-
-    with pytest.raises(error):
-        list(run(portion, [(i,) for i in range(5)], n_jobs=n_jobs, prefer="threads"))
-    assert blas_threads() == found
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_ctrl_c_during_portions_of_threads_restores_threads(found):
-    def portion(i):
-        if i == 1:
-            os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(0.2)
-
-    # In the background of a shell the signal may be ignored; and Python drops what is raised while
-    # garbage is collected, such as connections of other tests.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    gc.collect()
-    gc.disable()
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            list(run(portion, [(i,) for i in range(20)], n_jobs=2, prefer="threads"))
-    finally:
-        gc.enable()
-        signal.signal(signal.SIGINT, before)
-    assert blas_threads() == found
-
-
-# joblib warns of dropped portions.
-@pytest.mark.filterwarnings("ignore:.*tasks:UserWarning")
-@pytest.mark.parametrize("n_jobs", [1, 2])
-@pytest.mark.parametrize("leave", ["close", "__del__"])
-def test_closed_generator_restores_threads(found, n_jobs, leave):
-    begun = []
-    portions = [(0,), *[(0.2,)] * 20]
-    work = {"n_jobs": n_jobs, "prefer": "threads"}
-    results = run(lambda t: begun.append(t) or time.sleep(t), portions, **work)
-    next(results)
-    if leave == "close":
-        results.close()
-    else:
-        del results
-    assert blas_threads() == found
-    assert len(begun) < 10

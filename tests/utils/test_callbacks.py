@@ -26,7 +26,7 @@ pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn
 
 
 class Recorder:
-    """Keeps what it is told, and fails at the event of a number."""
+    """Keeps what it is told, and fails at an event, of a number or of a hook and a task."""
 
     def __init__(self, fails_at=None):
         self.fails_at = fails_at
@@ -38,7 +38,7 @@ class Recorder:
 
     def _record(self, hook, context):
         self.contexts.append((hook, context))
-        if len(self.contexts) - 1 == self.fails_at:
+        if self.fails_at in (len(self.contexts) - 1, (hook, context.task_name)):
             raise StopFitError
 
     def setup(self, estimator, context):
@@ -79,15 +79,19 @@ def test_callbacks_follow_every_fit_and_change_no_bit(estimator):
     assert recorder.open == []
     assert recorder.torn_down == 1
     seen = len(recorder.contexts)
-    found = bits(watched, X)
+    plain, expected = clone(estimator).fit(X), bits(watched, X)
     assert len(recorder.contexts) == seen
-    assert found == bits(clone(estimator).fit(X), X)
+    # A fit that is stopped at its end leaves the earlier one as it was.
+    attributes = vars(plain).keys() | {"_skl_callbacks"}
+    with pytest.raises(StopFitError):
+        plain.set_callbacks(Recorder(("end", "fit"))).fit(X[1:])
+    assert vars(plain).keys() == attributes
+    assert bits(plain, X) == expected
 
 
 @pytest.mark.parametrize(
     ("estimator", "where"),
     [
-        *((estimator, "last task") for estimator in EVERY),
         *((LinearSynchronizer(), where) for where in ("setup", "first task", "middle")),
         *((DenseSynchronizer(), where) for where in ("setup", "first task", "middle")),
     ],
@@ -100,9 +104,7 @@ def test_a_callback_that_raises_stops_the_fit(estimator, where):
     fitted = clone(estimator).fit(X)
     expected, attributes = bits(fitted, X), vars(fitted).keys() | {"_skl_callbacks"}
     last = len(all_of_it.contexts) - 1
-    recorder = Recorder(
-        {"setup": 0, "first task": 1, "middle": last // 2, "last task": last}[where]
-    )
+    recorder = Recorder({"setup": 0, "first task": 1, "middle": last // 2}[where])
     with pytest.raises(StopFitError):
         fitted.set_callbacks(recorder).fit(X[1:])
     assert len(recorder.contexts) == recorder.fails_at + 1
