@@ -252,7 +252,8 @@ def plain_scores(fold):
     pairs = [(name, fault) for faults in fold.faults for name, fault in faults.items() if fault]
     curves = synchronised(cosines.transform([fault.trial for _, fault in pairs]))
     said = []
-    for (name, fault), z in zip(pairs, model.standard_scores(curves), strict=True):
+    scores = (curves - model.mean_) / np.sqrt(model.predictive_variance_)
+    for (name, fault), z in zip(pairs, scores, strict=True):
         z = np.abs(z[:, 1:])
         peak, feature = np.unravel_index(z.argmax(), z.shape)
         within = z[:, feature] > 3

@@ -15,7 +15,6 @@ from sklearn_motionsync import (
     to_sequences,
 )
 from sklearn_motionsync.io import cut_at_events
-from sklearn_motionsync.model.departures import runs
 from sklearn_motionsync.online.particle_filter import weighted_median
 
 SEEDS = range(2)
@@ -102,12 +101,3 @@ def test_first_component_reaches_its_share_of_the_variance(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_median_of_equal_weights_is_the_lower_one_of_two(seed):
     assert weighted_median(np.arange(10.0), shaken(np.full(10, 0.1), seed)) == 4
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_run_of_equal_scores_has_its_peak_at_the_first_frame(seed):
-    scores = np.array([0, 3, 3, 3, 1, 0, -2, -4, -4, 0.0])[np.newaxis, :, np.newaxis]
-    found = runs(shaken(scores, seed), 1.5)
-    assert [found.first.tolist(), found.peak.tolist(), found.last.tolist()] == [
-        [1, 6], [1, 7], [3, 8]
-    ]  # fmt: skip

@@ -22,8 +22,7 @@ from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..io.events import is_table_of_events, keyframes_from_events
 from ..synchronizers.match import check_unit, rates_of
 from ..utils.parallel import Progress
-from .permutation import check_test, families
-from .study import GroupsOfPeople, Study
+from .study import GroupsOfPeople, Study, check_test, families
 
 __all__ = ["compare_events"]
 
@@ -122,8 +121,28 @@ def compare_events(
     event
     toe-off   6...
     """
-    check_unit(unit)
     check_test(level, n_permutations)
+    values, names = _times_of_events(X, events, check_unit(unit), frame_rate)
+    n = len(values)
+    is_tested = groups is not None or covariate is not None
+    study = Study.of(groups, covariate, people, paired, n) if is_tested else None
+    of_people = GroupsOfPeople.of(groups, people, n)
+    table = _table_of_groups(of_people, values, names)
+    if study is None:
+        return table
+    units = study.units(of_people.fill(values))
+    rng, progress = check_random_state(random_state), Progress(None, 0)
+    curves = [units[:, np.newaxis]]
+    (family,) = families(study.design, curves, n_permutations, rng, progress=progress)
+    sizes = [study.size(units[:, k], "timing") for k in range(values.shape[1])]
+    table[["direction", "size", "lower", "upper"]] = pd.DataFrame(sizes, index=table.index)
+    table["p"] = family.shares(np.abs(family.found[0]))
+    table["differs"] = table["p"] <= level
+    return table
+
+
+def _times_of_events(X, events, unit, frame_rate):
+    """Times of events (n_sequences, n_events) in a unit, NaN where not known, and their names."""
     if events is None or is_table_of_events(events):
         events = keyframes_from_events(X, events, frame_rate=frame_rate)
     reader = type("compare_events", (SequenceLevelMixin, BaseEstimator), {})()
@@ -140,13 +159,13 @@ def compare_events(
                 "unit='seconds' needs frame_rate, frames a second of the performances."
             )
         scale = 1 / np.broadcast_to(as_frame_rates(rates, n), (n, 1))
-    values = frames * scale
-    names = events.columns if isinstance(events, pd.DataFrame) else range(values.shape[1])
-    is_tested = groups is not None or covariate is not None
-    study = Study.of(groups, covariate, people, paired, n) if is_tested else None
-    of_people = GroupsOfPeople.of(groups, people, n)
-    index = pd.Index(names, name="event", tupleize_cols=False)
-    table = pd.DataFrame(index=index)
+    names = events.columns if isinstance(events, pd.DataFrame) else range(frames.shape[1])
+    return frames * scale, names
+
+
+def _table_of_groups(of_people, values, names):
+    """Mean, standard deviation and number of people by event and group."""
+    table = pd.DataFrame(index=pd.Index(names, name="event", tupleize_cols=False))
     for label, means in zip(of_people.labels, of_people.means(values), strict=True):
         counts = (~np.isnan(means)).sum(axis=0)
         if counts.min() < 2:
@@ -160,16 +179,4 @@ def compare_events(
         table[f"{prefix}mean"] = np.nanmean(means, axis=0)
         table[f"{prefix}sd"] = np.nanstd(means, axis=0, ddof=1)
         table[f"{prefix}n"] = counts
-    if study is None:
-        return table
-    units = study.units(of_people.fill(values))
-    progress = Progress(None, 0)
-    rng = check_random_state(random_state)
-    (family,) = families(
-        study.design, [units[:, np.newaxis]], n_permutations, rng, progress=progress
-    )
-    sizes = [study.size(units[:, k], "timing") for k in range(values.shape[1])]
-    table[["direction", "size", "lower", "upper"]] = pd.DataFrame(sizes, index=index)
-    table["p"] = family.shares(np.abs(family.found[0]))
-    table["differs"] = table["p"] <= level
     return table

@@ -15,8 +15,7 @@ from ..matching.counting import first_largest, runs_of
 from ..synchronizers.match import UNITS
 from ..utils.parallel import Progress
 from .curves import AlignedCurves
-from .permutation import check_test, families, share_at_most
-from .study import Study
+from .study import Study, check_test, families, share_at_most
 
 __all__ = ["GroupComparison", "compare_aligned", "compare_groups"]
 
@@ -203,7 +202,6 @@ def compare_groups(
     --------
     compare_events : Tests when events happen.
     compare_to_norm : Tells of single subjects.
-    TimingChannel : Curves and offsets for a test or a model of your own.
 
     Notes
     -----
@@ -214,16 +212,9 @@ def compare_groups(
     3. The largest value over all frames and features, in each permutation, gives p of shape; over
        all frames of the offset, p of timing. The smaller of both, in each permutation, gives the
        joint p (Tippett). Clusters are corrected by it.
-    4. A warp may take a difference in the shape of one signal for timing. Timing is what signals
-       share: a cluster of timing counts if at least half of it is left whichever signal is left out
-       of the match (of more than eight, an eighth of them), by a fit of `DenseSynchronizer` without
-       it. Signals that support no warps, such as a constant, tell nothing. Otherwise the cluster is
-       left out of the table. ``p_timing`` is of the offsets as they are.
-
-    Frames at which nothing varies do not count, such as both ends of the offset. A single signal
-    leaves open what is shape and what is timing: a warp explains what it can. A difference in the
-    shape of all signals may move warps, and one in timing that no warp can follow stays in the
-    curves.
+    4. A cluster of timing is listed if at least half of it is left whichever signal is left out of
+       the match (of more than eight, an eighth of them), as a warp may take a difference in the
+       shape of one signal for timing. ``p_timing`` is of the offsets as they are.
 
     Examples
     --------
@@ -250,35 +241,14 @@ def compare_groups(
         unit=unit,
         frame_rate=frame_rate,
     )
-    return compare_aligned(
-        aligned,
-        groups,
-        covariate=covariate,
-        people=people,
-        paired=paired,
-        level=level,
-        n_permutations=n_permutations,
-        random_state=random_state,
-        n_jobs=n_jobs,
-        verbose=verbose,
-    )
+    study = Study.of(groups, covariate, people, paired, len(aligned.curves))
+    return compare_aligned(aligned, study, level, n_permutations, random_state, n_jobs, verbose)
 
 
 def compare_aligned(
-    aligned,
-    groups,
-    *,
-    covariate=None,
-    people=None,
-    paired=False,
-    level=0.05,
-    n_permutations=1999,
-    random_state=0,
-    n_jobs=None,
-    verbose=0,
+    aligned, study, level=0.05, n_permutations=1999, random_state=0, n_jobs=None, verbose=0
 ):
     """The comparison of performances that are matched already: `AlignedCurves`."""
-    study = Study.of(groups, covariate, people, paired, len(aligned.curves))
     values = aligned.curves, aligned.offsets[:, :, np.newaxis], aligned.even
     curves, offsets, even = map(study.units, values)
     shape, timing, linear = families(
@@ -290,15 +260,12 @@ def compare_aligned(
         progress=Progress(type("compare_groups", (), {})(), verbose),
     )
     least = np.minimum(shape.ranks, timing.ranks)
+    unit = UNITS[aligned.unit]
     rows = [
         *_clusters("shape", shape, curves, aligned.names, aligned.units, study, least, level),
-        *_clusters(
-            "timing", timing, offsets, ["offset"], [UNITS[aligned.unit]], study, least, level
-        ),
+        *_clusters("timing", timing, offsets, ["offset"], [unit], study, least, level),
     ]
-    rows = [
-        row for row, is_sure in zip(rows, _confirm(rows, aligned, study), strict=True) if is_sure
-    ]
+    rows = [row for row, sure in zip(rows, _confirm(rows, aligned, study), strict=True) if sure]
     table = pd.DataFrame(rows, columns=_COLUMNS).sort_values("p", kind="stable", ignore_index=True)
     for name in ("start", "end", "peak"):
         table[name] = aligned.clock[table[name].to_numpy(dtype=int)]

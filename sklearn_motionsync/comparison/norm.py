@@ -12,13 +12,13 @@ from sklearn.base import BaseEstimator
 
 from ..inputs.types import Features, Labels, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
-from ..model.departures import runs
-from ..model.similarity import t_prediction_limit, t_prediction_tail
+from ..matching.counting import first_largest, runs_of
+from ..model.acceptance import LogMoments
 from ..model.variation import predictive_variance
 from ..synchronizers.match import UNITS
 from ..utils.groups import encode_groups
 from .curves import AlignedCurves
-from .permutation import check_level
+from .study import check_level
 
 __all__ = ["NormComparison", "compare_to_norm"]
 
@@ -206,11 +206,6 @@ def compare_to_norm(
        person by Student's t. So p of shape and timing have their level, whatever the number of
        signals. p is twice the smaller one.
 
-    The root mean square by feature is the gait variable score of Baker and others (*Gait and
-    Posture* 30, 2009), if X are single strides and the signals are joint angles: ``linear`` is as
-    published, in ``aligned`` no timing is left. Their gait profile score is its root mean square
-    over the angles.
-
     Examples
     --------
     >>> from sklearn_motionsync import DenseSynchronizer, compare_to_norm
@@ -236,72 +231,73 @@ def compare_to_norm(
         frame_rate=frame_rate,
     )
     study = _Subjects.of(groups, norm, people, len(aligned.curves))
+    return _compare(aligned, study, float(level))
+
+
+def _compare(aligned, study, level):
+    """The comparison of performances that are matched already: `AlignedCurves`."""
     timing = aligned.offsets[:, :, np.newaxis]
     values = np.concatenate([aligned.curves, timing], axis=2).astype(np.float64, copy=False)
-    families = [slice(0, -1), slice(-1, None)]
     of_norm = [values[trials] for trials in study.of_norm]
     subjects = [values[trials] for trials in study.of_subjects]
-    reference = NormReference.of(np.stack([x.mean(axis=0) for x in of_norm]))
+    mean, std = _of_norm(np.stack([x.mean(axis=0) for x in of_norm]))
     curves = np.stack([x.mean(axis=0) for x in subjects])
-    z = reference.deviations(curves)
+    z = (curves - mean) / std
     counts = [len(x) for x in subjects]
-    chances = {
-        k: [_LargestDeviation(of_norm, k, columns) for columns in families] for k in set(counts)
-    }
-    p, limits = np.empty((len(z), 2)), np.empty((len(z), z.shape[2]))
-    for i, k in enumerate(counts):
-        for j, columns in enumerate(families):
-            p[i, j] = chances[k][j].tail(np.abs(z[i][:, columns]).max())
-            limits[i, columns] = chances[k][j].limit(level / 2)
+    p, limits = _chances(z, counts, of_norm, level)
     joint = np.minimum(1, 2 * p.min(axis=1))
-    verdicts = pd.DataFrame(
-        {
-            "group": study.groups,
-            "n_trials": counts,
-            "p": joint,
-            "p_shape": p[:, 0],
-            "p_timing": p[:, 1],
-            "differs": joint <= level,
-        },
-        index=pd.Index(study.labels, name="subject", tupleize_cols=False),
-    )
-    names, units = [*aligned.names, "offset"], [*aligned.units, UNITS[unit]]
+    columns = {"group": study.groups, "n_trials": counts, "p": joint}
+    columns |= {"p_shape": p[:, 0], "p_timing": p[:, 1], "differs": joint <= level}
+    subject = pd.Index(study.labels, name="subject", tupleize_cols=False)
+    verdicts = pd.DataFrame(columns, index=subject)
+    names, units = [*aligned.names, "offset"], [*aligned.units, UNITS[aligned.unit]]
     return NormComparison(
         verdicts=verdicts,
-        departures=_departures(z, curves - reference.mean, limits, verdicts, names, units, aligned),
+        departures=_departures(z, curves - mean, limits, verdicts, names, units, aligned),
         profile=_profile(curves, of_norm, aligned, study, names, units, verdicts.index),
-        level=float(level),
+        level=level,
         n_people=len(of_norm),
         unit=aligned.unit,
         clock=aligned.clock,
         features=names,
         units=units,
-        mean=reference.mean,
-        std=reference.std,
+        mean=mean,
+        std=std,
         limits=limits,
         curves=curves,
     )
 
 
-class NormReference(NamedTuple):
-    """Mean of a norm, and standard deviation of a new person, (P, n_features)."""
-
-    mean: np.ndarray
-    std: np.ndarray
-
-    @classmethod
-    def of(cls, means):
-        """Those of the means of people, (n_people, P, n_features)."""
-        variance = predictive_variance(means, np.arange(len(means)), _SHRINKAGE)
-        return cls(means.mean(axis=0), np.sqrt(variance))
-
-    def deviations(self, curves):
-        """Differences from the mean, in standard deviations."""
-        return (curves - self.mean) / self.std
+def _of_norm(means):
+    """Mean, and standard deviation of a new person, of those of people (n_people, P, n)."""
+    variance = predictive_variance(means, np.arange(len(means)), _SHRINKAGE)
+    return means.mean(axis=0), np.sqrt(variance)
 
 
-class _LargestDeviation:
-    """The largest deviation of a new person of a norm, of the mean of k trials.
+def _chances(z, counts, of_norm, level):
+    """Probabilities (n, 2) of deviations in shape and in timing, and limits (n, n_features).
+
+    Parameters
+    ----------
+    z : ndarray, shape (n, P, n_features)
+        Deviations of the means of subjects.
+    counts : list of int, length n
+        Of their trials.
+    of_norm : list of ndarray, shape (n_trials_i, P, n_features)
+        The trials of each person of the norm.
+    level : float
+    """
+    p, limits = np.empty((len(z), 2)), np.empty((len(z), z.shape[2]))
+    for j, columns in enumerate((slice(0, -1), slice(-1, None))):
+        of_new = {k: _largest_deviations(of_norm, k, columns) for k in set(counts)}
+        for i, k in enumerate(counts):
+            p[i, j] = of_new[k].tail(np.abs(z[i][:, columns]).max(), _PRIOR_VARIANCE)
+            limits[i, columns] = of_new[k].upper_limit(1 - level / 2, _PRIOR_VARIANCE)
+    return p, limits
+
+
+def _largest_deviations(of_people, k, part):
+    """The `LogMoments` of the largest deviation of a new person, of the mean of k trials.
 
     Parameters
     ----------
@@ -310,34 +306,20 @@ class _LargestDeviation:
     part : slice
         Of the features.
     """
-
-    def __init__(self, of_people, k, part):
-        means = np.stack([x[:, :, part].mean(axis=0) for x in of_people])
-        logs, weights = [], []
-        for i, x in enumerate(of_people):
-            reference = NormReference.of(np.delete(means, i, axis=0))
-            # Means of k trials, of which each begins with another one.
-            n = len(x)
-            starts = range(n) if k < n else [0]
-            curves = [
-                x[(np.arange(min(k, n)) + start) % n, :, part].mean(axis=0) for start in starts
-            ]
-            z = np.abs(reference.deviations(np.stack(curves))).max(axis=(1, 2))
-            logs.append(np.log(np.maximum(z, np.finfo(float).tiny)))
-            weights.append(np.full(len(z), 1 / len(z)))
-        logs, weights = np.concatenate(logs), np.concatenate(weights)
-        self._n, self._mean = len(means), np.average(logs, weights=weights)
-        self._squares = float(weights @ np.square(logs - self._mean))
-
-    def tail(self, largest):
-        """The probability that a new person deviates more."""
-        value = np.log(max(largest, np.finfo(float).tiny)) - self._mean
-        return t_prediction_tail(self._n, self._squares, value, _PRIOR_VARIANCE)
-
-    def limit(self, p):
-        """The deviation with this tail probability."""
-        half = t_prediction_limit(self._n, self._squares, 1 - p, _PRIOR_VARIANCE)
-        return float(np.exp(self._mean + half))
+    means = np.stack([x[:, :, part].mean(axis=0) for x in of_people])
+    logs, weights = [], []
+    for i, x in enumerate(of_people):
+        mean, std = _of_norm(np.delete(means, i, axis=0))
+        # Means of k trials, of which each begins with another one.
+        n = len(x)
+        starts = range(n) if k < n else [0]
+        curves = [x[(np.arange(min(k, n)) + start) % n, :, part].mean(axis=0) for start in starts]
+        z = np.abs((np.stack(curves) - mean) / std).max(axis=(1, 2))
+        logs.append(np.log(np.maximum(z, np.finfo(float).tiny)))
+        weights.append(np.full(len(z), 1 / len(z)))
+    logs, weights = np.concatenate(logs), np.concatenate(weights)
+    mean = np.average(logs, weights=weights)
+    return LogMoments(len(means), float(mean), float(weights @ np.square(logs - mean)))
 
 
 class _Subjects(NamedTuple):
@@ -392,13 +374,18 @@ def _departures(z, differences, limits, verdicts, names, units, aligned):
     for i, label in enumerate(verdicts.index):
         departures = []
         # Stretches above a share of the limit, in which it is exceeded somewhere.
-        stretches = runs(z[i : i + 1] / limits[i], _BETWEEN)
-        for feature, first, last, peak in zip(
-            stretches.feature, stretches.first, stretches.last, stretches.peak, strict=True
-        ):
-            beyond = first + np.flatnonzero(size[i, first : last + 1, feature] > limits[i, feature])
+        above_share = size[i] / limits[i] > _BETWEEN
+        stretches = [
+            (k, slice(*stretch))
+            for k in range(len(names))
+            for stretch in runs_of(above_share[:, k])
+        ]
+        for feature, stretch in stretches:
+            sizes = size[i, stretch, feature]
+            beyond = stretch.start + np.flatnonzero(sizes > limits[i, feature])
             if not len(beyond):
                 continue
+            peak = stretch.start + first_largest(sizes)
             is_timing = feature == len(names) - 1
             above, below = ("later", "earlier") if is_timing else ("above", "below")
             departures.append(

@@ -159,14 +159,14 @@ def draw_departures(estimator, X, params, caller, *, performance, frames, limit,
             f"{[type(step).__name__ for step in flat_steps(before)]}."
         )
     if models is None:
-        i, note = index(len(view.given)), ""
+        i, note = index(len(view.labels)), ""
         name = name_performance(i, view.labels[i])
     else:
         i, note = 0, " by the model of that class"
         name = name_performance(int(model.indices[0]), model.labels[0])
         name = f"{name}, most like {str(model.label)!r},"
     rows, skeleton = judged.rows(i, limit), limbs.cosines.skeleton.body()
-    is_accepted = view.own.predict(view.given.take([i]))[0] == 1
+    is_accepted = view.model_of_points.predict(view.curves.points.take([i]))[0] == 1
     if limit is None:
         # Hints would hide what is rare, and most right performances have some.
         rows = [row for row in rows if row.rare] or ([] if is_accepted else rows)
@@ -214,6 +214,8 @@ def split_at_synchronizer(estimator):
 
 def _departs_outside_aspace(view, i, columns):
     """Whether limbs depart beyond what is rare, but not in the aSpace of the model."""
-    in_aspace = (view.synchronised[i] - view.model.mean_) / view.predicted
-    largest, largest_in_aspace = (np.abs(z[:, columns]).max() for z in (view.scores[i], in_aspace))
+    deviations = (x[i] - view.model.mean_ for x in (view.whole, view.synchronised))
+    largest, largest_in_aspace = (
+        np.abs(z[:, columns] / view.predicted[:, columns]).max() for z in deviations
+    )
     return largest > view.model.simultaneous_factor() >= largest_in_aspace

@@ -223,7 +223,7 @@ class ActionModelDisplay:
         else:
             of_groups = curves_of_groups(view.model, shown, groups, people, band)
         n_frames, lengths, rates, units = len(view.model.mean_), None, frame_rate, {}
-        if view.model is view.own:
+        if view.model is view.model_of_points:
             before, model = find_step(estimator, ActionModel)
             undo, units = undo_scaling(before, X, model.mean_.shape[1])
             of_groups = [curves.through(undo) for curves in of_groups]

@@ -1,4 +1,4 @@
-"""The tests of a detector, each learnt by leaving people out, and the score of all of them."""
+"""What new people are expected to do at most, by logarithms, and the tests of a detector."""
 
 from dataclasses import dataclass
 
@@ -6,21 +6,31 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..utils.groups import mean_of_others
-from .similarity import (
-    DISSIMILARITY_VARIANCE,
-    LEAST,
-    log_moments,
-    t_prediction_limit,
-)
 
-__all__ = ["Acceptance", "Contrast", "LogPredictionInterval", "log_tails", "standardised_logs"]
+__all__ = [
+    "DISSIMILARITY_VARIANCE",
+    "LEAST",
+    "Acceptance",
+    "Contrast",
+    "LogMoments",
+    "LogPredictionInterval",
+    "dissimilarity_tails",
+    "log_moments",
+    "t_prediction_limit",
+]
 
+# Variance of the logarithm over performances of one action (16 actions of people); it weighs as
+# much as that of so many performances. That of a dissimilarity is the mean over 21 actions.
+_PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
+DISSIMILARITY_VARIANCE = 0.12
+# Smaller dissimilarities, and energies as a share of the total variance, are rounding.
+LEAST = 1e-9
 # The weight of tests but the main one. With it the area under the curve is .97 and .91 of wrong
 # performances (HDM05, UTKinect) and .94 of exercises done wrong (UI-PRMD); with 1 it is .96, .91
 # and .92, with 0 .96, .86 and .95.
 _WEIGHT = 0.15
-# Prior variance of the score, which is about 1, and of a contrast; as that of three performances.
-_SCORE_VARIANCE, _CONTRAST_VARIANCE, _PRIOR_COUNT = 0.3, 0.02, 3
+# Prior variance of the score, which is about 1, and of a contrast.
+_SCORE_VARIANCE, _CONTRAST_VARIANCE = 0.3, 0.02
 # The share of the variance of differences that is added to the squared length of their mean.
 _NOISE = 0.3
 # A contrast counts if its mean is at least so many of its standard deviations, and the mean
@@ -29,22 +39,102 @@ _NOISE = 0.3
 _CLEAR, _LARGE = 2, 0.1
 
 
-def log_tails(deviations, n, two_sided=False):
-    """The logarithm of the probability of a new deviation as large, or larger.
+@dataclass(frozen=True)
+class LogMoments:
+    """Number, mean and sum of squared deviations of the logarithms of values; they add up."""
 
-    Deviations are from the mean of n normal values, in standard deviations estimated from these.
+    n: int = 0
+    mean: float = 0.0
+    squares: float = 0.0
+
+    @classmethod
+    def of(cls, values):
+        """Those of values (n,) above 0."""
+        if not len(values):
+            return cls()
+        return cls.of_logs(np.log(values))
+
+    @classmethod
+    def of_logs(cls, logs):
+        """Those of values with these logarithms (n,)."""
+        mean = logs.mean()
+        return cls(len(logs), float(mean), float(np.square(logs - mean).sum()))
+
+    def __add__(self, other):
+        if not self.n or not other.n:
+            return self if self.n else other
+        n, apart = self.n + other.n, other.mean - self.mean
+        squares = self.squares + other.squares + apart**2 * self.n * other.n / n
+        return LogMoments(n, self.mean + apart * other.n / n, squares)
+
+    def upper_limit(self, coverage, prior_variance=_PRIOR_VARIANCE):
+        """What a new value stays below with this probability."""
+        limit = t_prediction_limit(self.n, self.squares, coverage, prior_variance)
+        return float(np.exp(self.mean + limit))
+
+    def tail(self, value, prior_variance=_PRIOR_VARIANCE):
+        """The probability that a new value is above this one."""
+        freedom, scale = _prediction(self.n, self.squares, prior_variance)
+        apart = np.log(max(value, np.finfo(float).tiny)) - self.mean
+        return float(student.sf(apart / scale, freedom))
+
+    def standardize(self, values, prior_variance=_PRIOR_VARIANCE):
+        """Deviations of the logarithms of values from the mean, in standard deviations."""
+        squares = self.squares + _PRIOR_COUNT * prior_variance
+        return (np.log(values) - self.mean) / np.sqrt(squares / (self.n + _PRIOR_COUNT))
+
+
+def log_moments(dissimilarities):
+    """The `LogMoments` of dissimilarities, of which those below 1e-9 are rounding."""
+    return LogMoments.of(np.maximum(dissimilarities, LEAST))
+
+
+def t_prediction_limit(n, squares, coverage, prior_variance=_PRIOR_VARIANCE):
+    """Upper prediction limit of a new normal value, less the mean, by Student's t distribution.
+
+    Parameters
+    ----------
+    n : int
+        Number of values.
+    squares : float
+        Sum of their squared deviations from the mean.
+    coverage : float
+        Probability that a new value is below the limit.
+    prior_variance : float, default=0.07
+        Counts like the variance of three values.
+
+    Returns
+    -------
+    float
     """
-    freedom, error = n - 1 + _PRIOR_COUNT, np.sqrt(1 + 1 / n)
-    if two_sided:
-        return student.logsf(np.abs(deviations) / error, freedom) + np.log(2)
-    return student.logsf(deviations / error, freedom)
+    freedom, scale = _prediction(n, squares, prior_variance)
+    return float(student.ppf(coverage, freedom) * scale)
 
 
-def standardised_logs(held_out, new=None):
-    """Deviations of the logarithms of dissimilarities from those of held-out ones."""
+def _prediction(n, squares, prior_variance):
+    """Degrees of freedom, and standard error of a new value less the mean."""
+    freedom = n - 1 + _PRIOR_COUNT
+    squares = squares + _PRIOR_COUNT * prior_variance
+    return freedom, np.sqrt(squares / freedom * (1 + 1 / n))
+
+
+# -- the tests of a detector
+
+
+def dissimilarity_tails(held_out, new=None):
+    """The logarithm of the probability of dissimilarities as large, or larger.
+
+    Parameters
+    ----------
+    held_out : ndarray (n,)
+        Of training performances to those of other people.
+    new : ndarray (n_new,), default=None
+        By default those held out.
+    """
     moments = log_moments(held_out)
     values = np.maximum(held_out if new is None else new, LEAST)
-    return moments.standardize(values, DISSIMILARITY_VARIANCE)
+    deviations = moments.standardize(values, DISSIMILARITY_VARIANCE)
+    return student.logsf(deviations / np.sqrt(1 + 1 / moments.n), moments.n - 1 + _PRIOR_COUNT)
 
 
 @dataclass(frozen=True)
@@ -58,7 +148,7 @@ class Acceptance:
     Parameters
     ----------
     held_out : dict of str to ndarray (n,)
-        The `log_tails` of every test, of training performances.
+        The logarithms of the probabilities of every test, of training performances.
     groups : ndarray of int (n,)
         Their people. Scores of one person are alike, so the error of the mean is that of people.
     coverage : float
@@ -124,6 +214,8 @@ class LogPredictionInterval:
         deviations = (logs - mean_of_others(logs, groups)) * np.sqrt((n - 1) / (n + 1))
         squares = np.square(deviations).sum()
         self._half_width = t_prediction_limit(n, squares, (1 + coverage) / 2)
+        self._freedom, self._error = n - 1 + _PRIOR_COUNT, np.sqrt(1 + 1 / n)
+        self._end = student.ppf((1 + coverage) / 2, self._freedom) * self._error
         self.deviations = deviations / self._half_width
         ends = np.exp([self._mean - self._half_width, self._mean + self._half_width])
         self.lower, self.upper = map(float, ends)
@@ -131,6 +223,11 @@ class LogPredictionInterval:
     def standardize(self, values):
         """Values on the scale on which the interval is -1 to 1."""
         return (np.log(values) - self._mean) / self._half_width
+
+    def tails(self, deviations):
+        """The logarithm of the probability of deviations on this scale as large to either side."""
+        size = np.abs(self._end * deviations)
+        return student.logsf(size / self._error, self._freedom) + np.log(2)
 
 
 class Contrast:

@@ -24,8 +24,8 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups, group_counts
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from .personal import PersonalReference
-from .similarity import LEAST, Neighbours, PerformanceStream, learn_weights, log_moments
+from .acceptance import LEAST, log_moments
+from .similarity import Neighbours, PerformanceStream, PersonalReference, learn_weights
 from .variation import (
     clock_error,
     mean_band,
@@ -310,16 +310,13 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         """
         performances = self.check_performances(X)
         std = np.sqrt(np.maximum(self.variance_, self._variance_floor))
-        squares = np.array([np.square((x - self.mean_) / std).sum() for x in performances])
-        log_std, size = np.log(std).sum(dtype=np.float64), self.mean_.size
-        gaps = np.flatnonzero(np.isnan(squares))
-        if len(gaps):
-            log_std, size = np.full(len(squares), log_std), np.full(len(squares), size)
-        for i in gaps:
-            seen = ~np.isnan(performances[i])
-            squares[i] = np.nansum(np.square((performances[i] - self.mean_) / std))
-            log_std[i], size[i] = np.log(std[seen]).sum(dtype=np.float64), seen.sum()
-        return -0.5 * squares - log_std - 0.5 * size * np.log(2 * np.pi)
+        densities = np.empty(len(performances))
+        for i, x in enumerate(performances):
+            # Of what was seen.
+            seen, squares = ~np.isnan(x), np.nansum(np.square((x - self.mean_) / std))
+            log_std = np.log(std[seen]).sum(dtype=np.float64)
+            densities[i] = -0.5 * squares - log_std - 0.5 * seen.sum() * np.log(2 * np.pi)
+        return densities
 
     def score(
         self,
@@ -378,33 +375,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         performances = self.check_performances(X)
         return self._judge(reference).dissimilarity(performances)
 
-    def threshold_at(self, coverage: float, reference: PerformancesLike | None = None) -> float:
-        """The threshold of another coverage.
-
-        Parameters
-        ----------
-        coverage : float
-            Share of performances of new people to be accepted, between 0 and 1.
-        reference : performances, default=None
-            As for `dissimilarity`.
-
-        Returns
-        -------
-        float
-            Equals ``threshold_`` for the ``coverage`` of the model.
-
-        Raises
-        ------
-        ValueError
-            If it is no share.
-        """
-        self._check_groups_seen()
-        if not (isinstance(coverage, Real) and 0 < coverage < 1):
-            raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-        if reference is None:
-            return self._neighbours.limit(self._log_moments, coverage)
-        return self._judge(reference).limit(coverage)
-
     def decision_function(
         self, X: PerformancesLike, reference: PerformancesLike | None = None
     ) -> np.ndarray:
@@ -442,26 +412,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             1 if the dissimilarity is at most the threshold, else -1.
         """
         return np.where(self.decision_function(X, reference) >= 0, 1, -1)
-
-    def standard_scores(self, X: PerformancesLike) -> np.ndarray:
-        """Deviations of performances from the mean, in predicted standard deviations.
-
-        Parameters
-        ----------
-        X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances.
-
-        Returns
-        -------
-        ndarray, shape (n_sequences, P, n_features)
-            ``(X - mean_) / sqrt(predictive_variance_)``; NaN where nothing was seen.
-
-        See Also
-        --------
-        find_departures : A table of where they are large.
-        """
-        performances = np.stack(self.check_performances(X))
-        return (performances - self.mean_) / np.sqrt(self.predictive_variance_)
 
     # -- postures, bands and samples ----------------------------------------------------------
 

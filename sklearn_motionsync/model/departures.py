@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from numbers import Real
 from typing import Any, NamedTuple
@@ -15,6 +16,7 @@ from ..inputs.features import choose_features
 from ..inputs.types import Features, PerformancesLike
 from ..matching.counting import ROUNDING, first_largest, whole
 from ..matching.gaps import fill_with_mean
+from ..matching.warps import at_times
 from ..synchronizers.linear import LinearSynchronizer
 from ..utils.pipelines import find_synchronizer, route_to_synchronizer
 from .faults import FaultFinder, Part, expected_performance
@@ -29,6 +31,8 @@ _OUTSIDE, _HELD = 8, 0.95
 _CORRELATION_TIME = 0.1
 # Frames around a peak belong to it if they deviate by so much of it.
 _OF_PEAK = 0.5
+_COLUMNS = ["performance", "kind", "limb", "region", "feature", "first", "last", "peak"]
+_COLUMNS += ["size", "unit", "deviation", "rare"]
 _DTYPES = {
     "first": np.intp, "last": np.intp, "peak": np.intp,
     "size": np.float64, "deviation": np.float64, "rare": bool,
@@ -156,25 +160,21 @@ def _departures(estimator, X, params, caller, features, limit, reference, part=N
     view, space = judged.view, judged.space
     rows = [row for i in range(len(judged.scores)) for row in judged.rows(i, limit)]
     labels = view.labels if part is None else part.labels
+    table = pd.DataFrame(rows, columns=_COLUMNS, dtype=object).astype(_DTYPES)
     # A label may be a tuple, which an array would unpack.
-    columns = {"performance": pd.Series([labels[row.performance] for row in rows], dtype=object)}
+    table["performance"] = pd.Series([labels[row.performance] for row in rows], dtype=object)
+    table["feature"] = pd.Series([space.names[row.feature] for row in rows], dtype=object)
     if part is not None:
-        columns["class"] = np.full(len(rows), part.label, dtype=object)
-        columns["index"] = np.array([row.performance for row in rows], dtype=np.intp)
-    texts = ["kind", "limb", "region"] if space.limbs is not None else ["kind"]
-    for name in [*texts, "feature", "first", "last", "peak", "size", "unit", "deviation", "rare"]:
-        column = [getattr(row, name) for row in rows]
-        if name == "feature":
-            column = [space.names[k] for k in column]
-        columns[name] = np.array(column, dtype=_DTYPES.get(name, object))
-    columns["timing"] = np.zeros(len(rows), dtype=bool)
+        table.insert(1, "class", np.full(len(rows), part.label, dtype=object))
+        table.insert(2, "index", np.array([row.performance for row in rows], dtype=np.intp))
+    if space.limbs is None:
+        table = table.drop(columns=["limb", "region"])
+    table["timing"] = np.zeros(len(rows), dtype=bool)
     if rows and judged.match is not None and judged.match.intervals is not None:
-        fields = "performance", "feature", "first", "last", "peak", "deviation"
-        faults = Runs(*(np.array([getattr(row, name) for row in rows]) for name in fields))
         reach = (view.model.n_std if limit is None else limit) * judged.std
         lower, upper = judged.mean - reach, judged.mean + reach
-        columns["timing"] = explained_by_timing(faults, judged.curves, lower, upper, judged.match)
-    return pd.DataFrame(columns).infer_objects()
+        table["timing"] = explained_by_timing(rows, judged.curves, lower, upper, judged.match)
+    return table.infer_objects()
 
 
 class Departure(NamedTuple):
@@ -298,28 +298,30 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     """
     postures = features is None
     view = view_of(estimator, X, params, caller, features=features, postures=postures)
-    sought = range(len(view.given)) if only is None else [only(len(view.given))]
+    n = len(view.labels)
+    sought = range(n) if only is None else [only(n)]
     names, chosen = view.names, np.arange(len(view.names))
     if features is not None:
         chosen = np.array(choose_features(features, names))
-    try:
+    before, match = None, view.curves.match
+    with suppress(ValueError):
         before = find_synchronizer(estimator)[0]
-    except ValueError:
-        before = None
+        if match is None:
+            # The synchronizer stands before an aSpace.
+            match = route_to_synchronizer(estimator, X, params, caller).match()
     limbs = limbs_of(before, names) if features is None else None
     space = FaultSpace([names[i] for i in chosen], limbs)
     training, groups = view.training[..., chosen].astype(np.float64), view.model.groups_
     mean, std, of_person = view.model.mean_[:, chosen], view.predicted[:, chosen], None
     if reference is not None:
-        of_person = view_of(
+        reference_view = view_of(
             estimator, reference, {}, caller, features=features, postures=postures
-        ).whole[..., chosen]
-        of_person = fill_with_mean(of_person.astype(np.float64), mean)
+        )
+        of_person = fill_with_mean(reference_view.whole[..., chosen].astype(np.float64), mean)
         mean, variance = expected_performance(training, groups, of_person)
         std = np.sqrt(variance + view.residual_variance[chosen] * (1 + 1 / len(of_person)))
     curves, left_out = view.whole[..., chosen], view.residual_variance[chosen]
     filled = fill_with_mean(curves.astype(np.float64), mean)
-    match = _match_of(estimator, X, params, caller)
     linear, later = None, [None] * len(filled)
     examples = view.in_linear_time
     if match is not None and examples is not None and not _is_linear(estimator):
@@ -327,8 +329,8 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
         # Features that come last are unknown in linear time, such as a `TimingChannel`.
         padded = np.zeros((*examples.shape[:2], len(names)))
         padded[..., : examples.shape[2]] = examples
-        whose = view.own.groups_
-        if not len(examples) == len(whose) == view.own.n_samples_seen_:
+        whose = view.model_of_points.groups_
+        if not len(examples) == len(whose) == view.model_of_points.n_samples_seen_:
             whose = np.arange(len(examples))
 
         def to_space(performances):
@@ -336,8 +338,7 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
 
         of_reference = None
         if of_person is not None:
-            times = _match_of(estimator, reference, {}, caller).times
-            of_reference = to_space(unwarped(of_person, times))
+            of_reference = to_space(unwarped(of_person, reference_view.curves.match.times))
         if width:
             examples = with_residuals(padded[..., chosen], whose, left_out)
             linear = to_space(examples), whose, of_reference
@@ -449,22 +450,9 @@ def around_peak(scores, peak):
 
 def unwarped(performances, times):
     """Performances (n, P, n_features) on the clock, in linear time, by their times (n, P)."""
-    frames, out = np.arange(performances.shape[1]), np.empty_like(performances)
-    for x, own_times, unwound in zip(performances, times, out, strict=True):
-        at = np.interp(frames, own_times, frames)
-        below = np.minimum(at.astype(np.intp), len(frames) - 2)
-        weight = (at - below)[:, np.newaxis]
-        unwound[:] = x[below] * (1 - weight) + x[below + 1] * weight
-    return out
-
-
-def _match_of(estimator, X, params, caller):
-    """The match of performances; None without a synchronizer."""
-    try:
-        find_synchronizer(estimator)
-    except ValueError:
-        return None
-    return route_to_synchronizer(estimator, X, params, caller).match()
+    frames = np.arange(performances.shape[1])
+    pairs = zip(performances, times, strict=True)
+    return np.stack([at_times(x, np.interp(frames, of_one, frames)) for x, of_one in pairs])
 
 
 def _is_linear(estimator):
@@ -474,69 +462,15 @@ def _is_linear(estimator):
     return isinstance(synchronizer, LinearSynchronizer) and synchronizer.keyframes_ is None
 
 
-class Runs(NamedTuple):
-    """Runs of consecutive frames beyond a limit, by performance, feature and frame.
+def explained_by_timing(rows, curves, lower, upper, match):
+    """Whether a wrong clock may be the reason of departures, (n_rows,).
 
-    Attributes
-    ----------
-    performance, feature : ndarray of int, shape (n_runs,)
-    first, last : ndarray of int, shape (n_runs,)
-        The first and the last frame of the run.
-    peak : ndarray of int, shape (n_runs,)
-        The frame of the largest score, the first of several.
-    score : ndarray, shape (n_runs,)
-        The score there, with its sign.
-    """
-
-    performance: np.ndarray
-    feature: np.ndarray
-    first: np.ndarray
-    last: np.ndarray
-    peak: np.ndarray
-    score: np.ndarray
-
-
-def runs(scores, limit):
-    """Runs of consecutive frames in which a feature's scores exceed a limit.
-
-    Parameters
-    ----------
-    scores : ndarray, shape (n, P, n_features)
-        Standard deviations from the mean.
-    limit : float
-        Positive, of absolute values.
-
-    Returns
-    -------
-    Runs
-    """
-    scores = np.moveaxis(scores, 1, 2)
-    size = np.abs(scores)
-    edges = np.diff(size > limit, axis=2, prepend=False, append=False)
-    # Each run gives two edges: its first frame and the one after its last.
-    performance, feature, frame = (at.reshape(-1, 2).T for at in np.nonzero(edges))
-    first, last = frame[0], frame[1] - 1
-    lengths = last - first + 1
-    of = np.repeat(np.arange(len(first)), lengths)
-    frames = np.arange(len(of)) - np.repeat(np.cumsum(lengths) - lengths - first, lengths)
-    inside = size[performance[0][of], feature[0][of], frames]
-    # Of each run the first of the frames with the largest score.
-    largest = np.maximum.reduceat(inside, np.cumsum(lengths) - lengths) if len(of) else inside
-    high = np.flatnonzero(inside >= largest[of] * (1 - ROUNDING))
-    peak = frames[high[np.unique(of[high], return_index=True)[1]]]
-    score = scores[performance[0], feature[0], peak]
-    return Runs(performance[0], feature[0], first, last, peak, score)
-
-
-def explained_by_timing(found, curves, lower, upper, match):
-    """Whether a wrong clock may be the reason of runs, (n_runs,).
-
-    The time of every frame of the run may then be another one inside its interval, where the
+    The time of every frame of one may then be another one inside its interval, where the
     performance has values between the bounds.
 
     Parameters
     ----------
-    found : Runs
+    rows : list of Departure
     curves : ndarray, shape (n, P, n_features)
         Performances on the clock.
     lower, upper : ndarray, shape (P, n_features)
@@ -547,10 +481,11 @@ def explained_by_timing(found, curves, lower, upper, match):
     n_frames, pairs = curves.shape[1], zip(match.times, *match.interval(), strict=True)
     # The frames of the clock whose times are inside the interval of a frame.
     spans = np.array([(t.searchsorted(a), t.searchsorted(b, "right")) for t, a, b in pairs])
-    frames, explained = np.arange(n_frames), np.empty(len(found.first), dtype=bool)
+    frames, explained = np.arange(n_frames), np.empty(len(rows), dtype=bool)
     starts, ends = np.minimum(spans[:, 0], frames), np.maximum(spans[:, 1], frames + 1)
-    for k, (i, feature) in enumerate(zip(found.performance, found.feature, strict=True)):
-        curve, run = curves[i, :, feature], frames[found.first[k] : found.last[k] + 1]
+    for k, row in enumerate(rows):
+        i, feature = row.performance, row.feature
+        curve, run = curves[i, :, feature], frames[row.first : row.last + 1]
         # A fault may last over a gap, in which nothing was seen.
         run = run[~np.isnan(curve[run])]
         seen = [curve[starts[i, p] : ends[i, p]] for p in run]

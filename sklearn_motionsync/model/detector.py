@@ -8,7 +8,6 @@ from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student
 from sklearn import get_config
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, clone
 from sklearn.utils._param_validation import HasMethods, Interval, StrOptions
@@ -34,10 +33,9 @@ from ..utils.pipelines import (
     steps_to_fit,
     takes_gaps,
 )
-from .acceptance import Acceptance, Contrast, LogPredictionInterval, log_tails, standardised_logs
+from .acceptance import Acceptance, Contrast, LogPredictionInterval, dissimilarity_tails
 from .action_model import ActionModel
-from .personal import PersonalReference
-from .similarity import PerformanceStream, movement_energies
+from .similarity import PerformanceStream, PersonalReference, movement_energies
 from .views import curves_of
 
 __all__ = ["ActionDetector"]
@@ -269,7 +267,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray of int, shape (n_sequences,)
             1 if the score is below its limit, and all contrasts are above theirs; else -1.
         """
-        return np.where(self._scores(X, reference, params, "predict") <= 1, 1, -1)
+        scores = self._judge(X, reference, params, "predict")["score"].to_numpy()
+        return np.where(scores <= 1, 1, -1)
 
     def decision_function(
         self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
@@ -291,7 +290,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray, shape (n_sequences,)
             ``score_samples`` less ``offset_``: negative for performances that are rejected.
         """
-        return 1 - self._scores(X, reference, params, "decision_function")
+        return 1 - self._judge(X, reference, params, "decision_function")["score"].to_numpy()
 
     def score_samples(
         self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
@@ -313,7 +312,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray, shape (n_sequences,)
             At least ``offset_`` for performances that are accepted.
         """
-        return -self._scores(X, reference, params, "score_samples")
+        return -self._judge(X, reference, params, "score_samples")["score"].to_numpy()
 
     def report(
         self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
@@ -339,12 +338,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             those that are too short or too weak. ``score``: up to 1 is accepted. ``reason`` of a
             rejection, such as "too long, too weak"; empty if the performance is accepted.
         """
-        judged = self._test(X, reference, params, "report")
-        labels, levels = labels_of_input(X, judged.performances)
-        table = pd.DataFrame(judged.statistics, index=index_of(labels, levels[:-1]))
-        table["score"] = judged.scores
-        table["reason"] = _reasons(judged)
-        return table
+        return self._judge(X, reference, params, "report")
 
     def get_metadata_routing(self):
         """The metadata that the detector requests, and routes to its pipeline.
@@ -385,14 +379,12 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             name: LogPredictionInterval(values, codes, coverage)
             for name, values in measures.items()
         }
-        n = len(whole)
-        end = student.ppf((1 + coverage) / 2, n + 2) * np.sqrt(1 + 1 / n)
         tails = {
-            name: log_tails(standardised_logs(model.dissimilarities_), n)
+            name: dissimilarity_tails(model.dissimilarities_)
             for name, model in (("movement", aligned), ("course", unaligned))
         }
         for name, interval in intervals.items():
-            tails[name] = log_tails(end * interval.deviations, n, two_sided=True)
+            tails[name] = interval.tails(interval.deviations)
         names = [curves.names[k] for k in columns]
         stream, _, is_kept = PerformanceStream.starting_at(whole[0]).extend(whole, codes)
         return _Tests(
@@ -400,7 +392,6 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             aligned,
             unaligned,
             intervals,
-            end,
             energy_floor,
             Acceptance(tails, codes, self.coverage),
             self._learn_contrasts(whole, aligned.mean_, names, codes),
@@ -433,29 +424,27 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             if c.is_clear or (name in always and c.middle > 0)
         }
 
-    def _test(self, X, reference, params, method):
-        """All statistics of performances, and their scores."""
+    def _judge(self, X, reference, params, method):
+        """The table of `report`."""
         check_is_fitted(self)
         tests, caller = self._tests, f"ActionDetector.{method}"
         try:
             reached = route_to_synchronizer(self.estimator_, X, params, caller, uses=("transform",))
-            curves = curves_of(self.estimator_, X, params, caller)
+            whole = curves_of(self.estimator_, X, params, caller).whole[..., tests.columns]
             of_person = None
             if reference is not None:
-                of_person = curves_of(self.estimator_, reference, {}, caller).whole[
-                    ..., tests.columns
-                ]
-                of_person = fill_with_mean(of_person, tests.aligned.mean_)
+                of_person = curves_of(self.estimator_, reference, {}, caller).whole
+                of_person = fill_with_mean(of_person[..., tests.columns], tests.aligned.mean_)
         except MissingMetadata as error:
             reason, name, _ = error.args
             raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error
-        performances, whole = reached.performances, curves.whole[..., tests.columns]
+        performances = reached.performances
         on_clock = reached.synchronizer.normalize(performances)
         statistics, tails, acceptance = {}, {}, tests.acceptance
 
         def compare(name, dissimilarity, held_out, limit):
             statistics[name] = dissimilarity / limit
-            tails[name] = log_tails(standardised_logs(held_out, dissimilarity), len(held_out))
+            tails[name] = dissimilarity_tails(held_out, dissimilarity)
 
         model = tests.aligned
         compare("movement", model.dissimilarity(whole), model.dissimilarities_, model.threshold_)
@@ -467,7 +456,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             held_out, dissimilarity = person.held_out[is_compared], person.dissimilarity(whole)
             compare("own", dissimilarity, held_out, person.limit(model.coverage))
             held = {name: values[is_compared] for name, values in tests.kept_tails.items()}
-            held["own"] = log_tails(standardised_logs(held_out), len(held_out))
+            held["own"] = dissimilarity_tails(held_out)
             acceptance = Acceptance(held, stream.groups[is_compared], self.coverage, main="own")
         model = tests.unaligned
         compare("course", model.dissimilarity(on_clock), model.dissimilarities_, model.threshold_)
@@ -475,10 +464,9 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             "duration": _durations(performances),
             "energy": movement_energies(on_clock, tests.energy_floor)[0],
         }
-        n = len(model.dissimilarities_)
         for name, interval in tests.intervals.items():
             statistics[name] = interval.standardize(measures[name])
-            tails[name] = log_tails(tests.end * statistics[name], n, two_sided=True)
+            tails[name] = interval.tails(statistics[name])
         scores = acceptance.scores(tails)
         # A person may differ from others, but not from the reference.
         alone = [
@@ -493,11 +481,18 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             statistics[name] = contrast.standardize(filled)
             # More like the image than like the action.
             far = np.maximum(far, statistics[name])
-        scores = np.where(far > 1, np.maximum(scores, far), scores)
-        return _Tested(statistics, scores, acceptance.shares(tails), list(tails), performances)
-
-    def _scores(self, X, reference, params, method):
-        return self._test(X, reference, params, method).scores
+        labels, levels = labels_of_input(X, performances)
+        table = pd.DataFrame(statistics, index=index_of(labels, levels[:-1]))
+        table["score"] = np.where(far > 1, np.maximum(scores, far), scores)
+        # What no test alone explains is that which adds most to the score.
+        names, shares = list(tails), acceptance.shares(tails)
+        reasons = []
+        for i, score in enumerate(table["score"]):
+            of_one = {name: values[i] for name, values in statistics.items()}
+            most = names[first_largest(shares[i])]
+            reasons.append(_reason(of_one, most) if score > 1 else "")
+        table["reason"] = reasons
+        return table
 
 
 def _check_steps(pipeline):
@@ -528,8 +523,6 @@ class _Tests(NamedTuple):
         Of performances after alignment, and after linear normalisation alone.
     intervals : dict of str to LogPredictionInterval
         Of durations, if they count, and energies.
-    end : float
-        The ends of an interval, in standard deviations.
     energy_floor : float
         The energy of standing still.
     acceptance : Acceptance
@@ -545,35 +538,11 @@ class _Tests(NamedTuple):
     aligned: ActionModel
     unaligned: ActionModel
     intervals: dict
-    end: float
     energy_floor: float
     acceptance: Acceptance
     contrasts: dict
     stream: PerformanceStream
     kept_tails: dict
-
-
-class _Tested(NamedTuple):
-    """What was found of performances.
-
-    Attributes
-    ----------
-    statistics : dict of str to ndarray (n,)
-        In units of their limits.
-    scores : ndarray (n,)
-        At most 1 is accepted.
-    shares : ndarray (n, n_tests)
-        What the tests ``names`` add to the squared score.
-    names : list of str
-    performances : sequence of ndarray
-        As they reach the synchronizer.
-    """
-
-    statistics: dict
-    scores: np.ndarray
-    shares: np.ndarray
-    names: list
-    performances: tuple
 
 
 def _reversed(performances):
@@ -596,19 +565,12 @@ def _durations(performances):
     return np.array([len(x) for x in performances], dtype=np.float64)
 
 
-def _reasons(found):
-    """The reason for the rejection of each performance; empty if it is accepted."""
-    reasons = []
-    for i, score in enumerate(found.scores):
-        values = {name: values[i] for name, values in found.statistics.items()}
-        beyond = [name for name, value in values.items() if abs(value) > 1]
-        beyond = [name for name in beyond if name in _TWO_SIDED or values[name] > 1]
-        if not beyond:
-            # No test alone: the one that adds most.
-            beyond = [found.names[first_largest(found.shares[i])]]
-        if "movement" in beyond:
-            # Another movement has another course.
-            beyond = [name for name in beyond if name != "course"]
-        texts = [_REASONS[name][int(values[name] > 0)] for name in beyond]
-        reasons.append(", ".join(texts) if score > 1 else "")
-    return reasons
+def _reason(statistics, most):
+    """The reason for the rejection of a performance: the tests beyond their limits, or that one."""
+    sizes = {k: abs(v) if k in _TWO_SIDED else v for k, v in statistics.items()}
+    beyond = [name for name, size in sizes.items() if size > 1]
+    beyond = beyond or [most]
+    if "movement" in beyond:
+        # Another movement has another course.
+        beyond = [name for name in beyond if name != "course"]
+    return ", ".join(_REASONS[name][int(statistics[name] > 0)] for name in beyond)

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..matching.counting import first_largest
-from .similarity import t_prediction_limit
+from ..matching.warps import at_times
+from .acceptance import t_prediction_limit
 from .variation import predictive_variance, within_variance
 
 __all__ = ["Expectation", "FaultFinder", "FoundFault", "Part", "expected_performance"]
@@ -143,9 +144,13 @@ class Expectation:
     between : ndarray (n_columns, n_columns)
         Inverse of the correlation between columns.
     parts : list of Part
+    windows : ndarray (n_windows, K)
+        Of values from 0 to 1.
+    lags : ndarray of int (n_lags,)
+        Frames by which the mean may be later.
     """
 
-    def __init__(self, mean, variance, over_time, between, parts):
+    def __init__(self, mean, variance, over_time, between, parts, windows, lags):
         self.mean, self.scale = mean, 1 / np.sqrt(variance)
         self.over_time, self.between, self.parts = over_time, between, parts
         self._belongs = np.zeros((len(between), len(parts)))
@@ -159,9 +164,16 @@ class Expectation:
             columns = np.array([parts[k].columns for k in of])
             blocks = between[columns[:, :, np.newaxis], columns[:, np.newaxis]]
             self._alike.append((of, columns, blocks))
+        self._prepare_windows(windows)
+        self.lags = lags
+        shifts = [(shifted(mean, lag) - mean) * self.scale for lag in lags]
+        self._shifts = np.array(shifts).reshape(len(lags), *mean.shape)
+        self._shift_norms = np.array([self._norms(x) for x in self._shifts])
+        self._swing = (mean - mean.mean(axis=0)) * self.scale
+        self._swing_norms = self._norms(self._swing)
+        self._whole_norm = np.sum(self._swing * (over_time @ self._swing @ between))
 
-    def seek_windows(self, windows):
-        """Prepare `of_windows`, for windows (n_windows, K) of values from 0 to 1."""
+    def _prepare_windows(self, windows):
         self._windows = windows[:, :, np.newaxis] * self.scale
         weighted = np.einsum("pq,wqf->wpf", self.over_time, self._windows, optimize=True)
         norms = np.einsum("wpf,wpf->wf", self._windows, weighted)
@@ -173,22 +185,6 @@ class Expectation:
             trace = np.trace(products, axis1=2, axis2=3)[..., np.newaxis, np.newaxis]
             eye = np.eye(columns.shape[1])
             self._inverse.append(np.linalg.inv(products + 1e-9 * (trace + _SMALLEST) * eye))
-        return self
-
-    def seek_lags(self, lags):
-        """Prepare `of_lags`: the mean so many frames later."""
-        self.lags = lags
-        shifts = [(shifted(self.mean, lag) - self.mean) * self.scale for lag in lags]
-        self._shifts = np.array(shifts).reshape(len(lags), *self.mean.shape)
-        self._shift_norms = np.array([self._norms(x) for x in self._shifts])
-        return self
-
-    def seek_amplitudes(self):
-        """Prepare `of_amplitude`."""
-        self._swing = (self.mean - self.mean.mean(axis=0)) * self.scale
-        self._swing_norms = self._norms(self._swing)
-        self._whole_norm = np.sum(self._swing * (self.over_time @ self._swing @ self.between))
-        return self
 
     def weigh(self, deviations):
         """Deviations (K, n_columns) in standard units, by the inverse covariances."""
@@ -273,7 +269,9 @@ class FaultFinder:
         largest = int(_LARGEST_LAG * n_frames)
         self._lags = np.array([lag for lag in range(-largest, largest + 1) if lag])
         coarse_reference = None if reference is None else self._coarse(reference)
-        self._clock = _Learnt(self._coarse(performances), groups, coarse_reference, parts, floor)
+        self._clock = _Learnt(
+            self._coarse(performances), groups, coarse_reference, parts, floor, self._lags
+        )
         self._linear = None
         if linear is not None:
             in_time, groups_in_time, reference_in_time = linear
@@ -284,12 +282,16 @@ class FaultFinder:
             self._known = np.array([k for k, part in enumerate(parts) if part in known_parts])
             floor = np.broadcast_to(floor, performances.shape[2:])[:columns]
             self._linear = _Learnt(
-                self._coarse(in_time), groups_in_time, reference_in_time, known_parts, floor
+                self._coarse(in_time),
+                groups_in_time,
+                reference_in_time,
+                known_parts,
+                floor,
+                self._lags,
             )
+            self._late = self._linear.expectation(self._windows)
+        self._expected = self._clock.expectation(self._windows)
         self._calibrate(coverage)
-        self._expected = self._prepared(self._clock.expectation)
-        if self._linear is not None:
-            self._late = self._prepared(self._linear.expectation)
 
     def find(self, performance, in_linear_time=None):
         """The faults of a performance (P, n_columns), the most important first.
@@ -334,7 +336,7 @@ class FaultFinder:
         expected = self._expected
         evidence = self._evidence(expected, rest)
         of_late = None if later is None else self._evidence(self._late, later)
-        total = self._total(evidence, of_late)
+        total = self._total(evidence, None if of_late is None else of_late.lag_gains)
         total = np.where(is_open, total, -1)
         part = first_largest(total)
         if not total[part] > 0:
@@ -369,10 +371,6 @@ class FaultFinder:
             deviation = np.log(max(ratio, 0.01)) / self._ratio_spread[part]
         return FoundFault(part, kind, 0.0, 1.0, float(size), float(deviation), float(score)), None
 
-    def _prepared(self, expectation):
-        expectation.seek_windows(self._windows).seek_lags(self._lags)
-        return expectation.seek_amplitudes()
-
     def _evidence(self, expectation, deviations):
         weighed = expectation.weigh(deviations)
         gains, changes = expectation.of_windows(weighed)
@@ -382,36 +380,33 @@ class FaultFinder:
         still = expectation.of_standing_still(weighed)
         return _Evidence(gains, changes, lag_gains, lags, ratio_gains, ratios, alone, still)
 
-    def _total(self, evidence, of_late):
-        """The evidence that something is wrong with each part."""
+    def _total(self, evidence, late_gains):
+        """The evidence that something is wrong with each part, with lags in linear time if any."""
         total = np.maximum(evidence.windows.max(axis=0), evidence.ratio_gains)
-        if of_late is None:
+        if late_gains is None:
             return np.maximum(total, evidence.lag_gains)
-        total[self._known] = np.maximum(total[self._known], of_late.lag_gains)
+        total[self._known] = np.maximum(total[self._known], late_gains)
         return total
 
     def _calibrate(self, coverage):
         """The scores that are usual and rare, and how lags and amplitudes of people vary."""
-        late = {}
+        late, pairs = {}, False
         if self._linear is not None:
-            for i, expectation, deviations in self._linear.left_out():
-                expectation.seek_windows(self._windows[:0]).seek_lags(self._lags)
-                late[i] = expectation.of_lags(expectation.weigh(deviations))
+            pairs = len(self._linear.indices) == len(self._clock.indices)
+            for i, expectation, deviations in self._linear.left_out(self._windows[:0]):
+                late[i] = expectation.of_lags(expectation.weigh(deviations))[0]
         scores, alone, still, lags, ratios = [], [], [], [], []
-        pairs = self._linear is not None and len(self._linear.indices) == len(self._clock.indices)
-        for i, expectation, deviations in self._clock.left_out():
-            evidence = self._evidence(self._prepared(expectation), deviations)
-            total = np.maximum(evidence.windows.max(axis=0), evidence.ratio_gains)
-            if self._linear is None:
-                total = np.maximum(total, evidence.lag_gains)
-            elif pairs:
-                total[self._known] = np.maximum(total[self._known], late[i][0])
-            scores.append(total.max()), alone.append(evidence.alone.max())
+        for i, expectation, deviations in self._clock.left_out(self._windows):
+            evidence = self._evidence(expectation, deviations)
+            # Without pairs, lags in linear time are compared below.
+            late_gains = None if self._linear is None else late[i] if pairs else 0.0
+            scores.append(self._total(evidence, late_gains).max())
+            alone.append(evidence.alone.max())
             still.append(evidence.still)
             lags.append(evidence.lags), ratios.append(evidence.ratios)
         if self._linear is not None and not pairs:
             # Others are kept in linear time: the larger ones of both.
-            of_late = np.sort([gains.max() for gains, _ in late.values()])
+            of_late = np.sort([gains.max() for gains in late.values()])
             ranks = np.linspace(0, len(of_late) - 1, len(scores))
             scores = np.maximum(np.sort(scores), np.interp(ranks, range(len(of_late)), of_late))
         gains = np.maximum([scores, alone, still], _SMALLEST)
@@ -436,10 +431,8 @@ class FaultFinder:
         n_frames = performances.shape[1]
         if n_frames == self._n_frames:
             return performances.astype(np.float64)
-        at = np.linspace(0, n_frames - 1, self._n_frames)
-        below = np.minimum(at.astype(np.intp), n_frames - 2)
-        weight = (at - below)[:, np.newaxis]
-        return performances[:, below] * (1 - weight) + performances[:, below + 1] * weight
+        times = np.linspace(0, n_frames - 1, self._n_frames)
+        return np.array([at_times(x, times) for x in performances])
 
 
 class _Evidence(NamedTuple):
@@ -462,8 +455,8 @@ class _Evidence(NamedTuple):
 class _Learnt:
     """What is expected of a new performance, and of those of each group by the other groups."""
 
-    def __init__(self, performances, groups, reference, parts, floor):
-        self._performances, self._parts = performances, parts
+    def __init__(self, performances, groups, reference, parts, floor, lags):
+        self._performances, self._parts, self._lags = performances, parts, lags
         codes = np.unique(groups, return_inverse=True)[1].ravel()
         n_reference = 0 if reference is None else len(reference)
         if n_reference and np.bincount(codes).max() < 2:
@@ -490,10 +483,13 @@ class _Learnt:
         scales = [1 / np.sqrt(self._expected[key][1]) for _, key, _ in self.indices]
         self._scores = np.array(deviations) * np.array(scales)
         mean, variance = expected_performance(performances, codes, reference)
-        variance, (over_time, between) = self._raised(variance, floor), precisions(self._scores)
-        self.expectation = Expectation(mean, variance, over_time, between, parts)
+        self._moments = mean, self._raised(variance, floor)
 
-    def left_out(self):
+    def expectation(self, windows):
+        """What is expected of a new performance."""
+        return self._expectation(self._moments, precisions(self._scores), windows)
+
+    def left_out(self, windows):
         """Each performance that was left out: index, expectation by others, and deviations."""
         inverses, before = {}, None
         for i, key, group in self.indices:
@@ -502,12 +498,15 @@ class _Learnt:
                 inverses = {
                     group: precisions(self._scores[is_other] if is_other.any() else self._scores)
                 }
-            mean, variance = self._expected[key]
             if key != before:
-                over_time, between = inverses[group]
-                expectation = Expectation(mean, variance, over_time, between, self._parts)
+                expectation = self._expectation(self._expected[key], inverses[group], windows)
                 before = key
-            yield i, expectation, self._performances[i] - mean
+            yield i, expectation, self._performances[i] - expectation.mean
+
+    def _expectation(self, moments, inverses, windows):
+        (mean, variance), (over_time, between) = moments, inverses
+        parts, lags = self._parts, self._lags
+        return Expectation(mean, variance, over_time, between, parts, windows, lags)
 
     def _raised(self, variance, floor):
         """Variances with a floor."""

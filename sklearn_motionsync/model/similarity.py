@@ -4,27 +4,23 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
 
 from ..matching.filters import smooth
 from ..matching.gaps import fill_with_mean, is_gappy
 from ..matching.warps import even_slices
-from ..utils.groups import encode_groups
+from ..utils.groups import encode_groups, mean_of_others, sums_of_groups
 from ..utils.parallel import one_blas_thread
+from .acceptance import DISSIMILARITY_VARIANCE, LEAST, LogMoments, log_moments
+from .variation import within_variance
 
 __all__ = [
-    "DIFFERENCES",
-    "DISSIMILARITY_VARIANCE",
-    "LEAST",
-    "LogMoments",
     "Neighbours",
     "PerformanceStream",
+    "PersonalReference",
     "Weights",
+    "distances_by_differences",
     "learn_weights",
-    "log_moments",
     "movement_energies",
-    "t_prediction_limit",
-    "t_prediction_tail",
 ]
 
 # A dissimilarity is the mean over so many nearest neighbours: a single one may be an outlier.
@@ -39,12 +35,6 @@ _MEAN_SHARE, _OWN_MEAN_SHARE = 0.05, 0.2
 _LEAST_VARIANCE = 0.01
 # Standard deviation of the Gaussian under which velocities are estimated, as a share of the clock.
 _VELOCITY_SMOOTHING = 0.01
-# Variance of the logarithm over performances of one action (16 actions of people); it weighs as
-# much as that of so many performances. That of a dissimilarity is the mean over 21 actions.
-_PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
-DISSIMILARITY_VARIANCE = 0.12
-# Smaller dissimilarities, and energies as a share of the total variance, are rounding.
-LEAST = 1e-9
 # Standing still has the dissimilarity 1 and is never accepted.
 _STILL_LIMIT = 1 - 1e-6
 # Performances compared at a time: bounds the memory. Matrix products take rows in tiles of one
@@ -57,18 +47,8 @@ _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _LATER = np.uint64(1 << 63)
 
 
-class Kernel(NamedTuple):
-    """How squared norms (n,) of rows, and squared distances (n, n_known) between them, round."""
-
-    norms: object
-    distances: object
-
-
-def _norms_by_sums(a):
-    return np.square(a).sum(axis=1)
-
-
-def _distances_by_products(a, b):
+def distances_by_products(a, b):
+    """Squared distances (n, n_known) of rows: faster for many performances."""
     squares = np.square(a).sum(axis=1)[:, np.newaxis] + np.square(b).sum(axis=1)
     tiles = np.zeros((-(-len(a) // _TILE), _TILE, a.shape[1]))
     tiles.reshape(-1, a.shape[1])[: len(a)] = a
@@ -78,20 +58,13 @@ def _distances_by_products(a, b):
     return np.maximum(squares - 2 * products, 0)
 
 
-def _norms_by_dots(a):
+def distances_by_differences(a, b):
+    """The same, exact for near ones."""
+    return np.stack([_norms(a - row) for row in b], axis=1)
+
+
+def _norms(a):
     return np.vecdot(a, a)
-
-
-def _distances_by_differences(a, b):
-    out = np.empty((len(a), len(b)))
-    for column, row in zip(out.T, b, strict=True):
-        column[:] = _norms_by_dots(a - row)
-    return out
-
-
-# The first is faster for many performances, the second is exact for near ones.
-PRODUCTS = Kernel(_norms_by_sums, _distances_by_products)
-DIFFERENCES = Kernel(_norms_by_dots, _distances_by_differences)
 
 
 def _velocities(performances):
@@ -154,8 +127,10 @@ def learn_weights(performances, groups, own=False):
         scale = (largest / np.maximum(variance, _LEAST_VARIANCE * largest)) ** 0.25
     moved, means = (moved * scale).reshape(n, -1), means * scale
     is_pair = np.triu((groups[:, np.newaxis] == groups) == own, 1)
-    apart, offset = (PRODUCTS.distances(x, x)[is_pair] for x in (moved, means - means.mean(axis=0)))
-    norms = PRODUCTS.norms(moved)
+    apart, offset = (
+        distances_by_products(x, x)[is_pair] for x in (moved, means - means.mean(axis=0))
+    )
+    norms = _norms(moved)
     energy = np.maximum((norms[:, np.newaxis] + norms)[is_pair], floor * n_frames)
     typical, of_means = (np.median(x / energy) for x in (apart, offset))
     # So they do where movements do not differ.
@@ -178,7 +153,8 @@ class Neighbours:
     groups : ndarray of int (n_kept,)
     features : callable, default=velocities
         Makes features (n, P, n_compared) of performances (n, P, n_features).
-    kernel : Kernel, default=PRODUCTS
+    distances : callable, default=distances_by_products
+        Squared distances of rows.
     mean : ndarray (P, n_features), default=None
         The mean performance, by which gaps (NaN) of performances are filled for their velocities
         and means. What was not seen of both performances of a pair counts in no sum of theirs.
@@ -195,11 +171,11 @@ class Neighbours:
         performances,
         groups,
         features=_velocities,
-        kernel=PRODUCTS,
+        distances=distances_by_products,
         mean=None,
         weights=_FIXED,
     ):
-        self._groups, self._features, self._kernel = groups, features, kernel
+        self._groups, self._features, self._distances = groups, features, distances
         self._mean, self._seen, self._weights = mean, None, weights
         if mean is not None and is_gappy(performances):
             self._seen = ~np.isnan(performances)
@@ -265,13 +241,13 @@ class Neighbours:
         """Dissimilarities of performances (n, P, n_features) to each neighbour: (n, n_kept)."""
         postures, energy, features, power = self._parts(performances)
         known_postures, known_energy, known_features, known_power = self._known
-        apart = self._kernel.distances(postures, known_postures)
+        apart = self._distances(postures, known_postures)
         if self.stand_still:
             return apart * LEAST / self._floor
         ratios = apart / np.maximum(energy[:, np.newaxis] + known_energy, self._floor)
         # Where neither moves, the distance is 0, too.
         sums = np.maximum(power[:, np.newaxis] + known_power, np.finfo(float).tiny)
-        ratios += self._kernel.distances(features, known_features) / sums
+        ratios += self._distances(features, known_features) / sums
         return ratios / 2
 
     def _ratios_of_seen(self, performance):
@@ -306,8 +282,78 @@ class Neighbours:
         moved = (performances - mean[:, np.newaxis]).reshape(n, -1)
         offset = np.sqrt(self._weights.mean * n_frames) * (mean - self._center)
         features = self._features(performances).reshape(n, -1)
-        norms = self._kernel.norms
-        return np.hstack([moved, offset]), norms(moved), features, norms(features)
+        return np.hstack([moved, offset]), _norms(moved), features, _norms(features)
+
+
+class PersonalReference:
+    """Neighbours made of a person's own performances, and how alike people repeat themselves.
+
+    Few performances tell a person's mean with an error, the variance within people over their
+    number m. Therefore the mean of the own performances is moved towards that of all people,
+    feature by feature: its deviation from that has the factor ``b / (b + w / m)``, with the
+    variances ``b`` between and ``w`` within people (the posterior mean of normal distributions).
+
+    Parameters
+    ----------
+    kept : ndarray (n_kept, P, n_features), float64
+        Training performances; NaN in gaps.
+    groups : ndarray of int (n_kept,)
+        The person of each.
+    mean : ndarray (P, n_features)
+        Of all training performances.
+    own : ndarray (m, P, n_features)
+        Of the person; NaN in gaps.
+
+    Attributes
+    ----------
+    moments : LogMoments
+        Of the dissimilarities of training performances to m others of the same person.
+    held_out : ndarray (n_kept,)
+        These dissimilarities; NaN for people with one performance.
+    """
+
+    def __init__(self, kept, groups, mean, own):
+        codes = np.unique(groups, return_inverse=True)[1].ravel()
+        counts = np.bincount(codes)
+        if counts.max() < 2:
+            raise ValueError(
+                "reference needs to know how people repeat themselves, but no group of the "
+                "training set has two performances: give groups to fit, and several performances "
+                "of some people."
+            )
+        filled = fill_with_mean(kept, mean)
+        self._mean, self._weights = mean, learn_weights(filled, codes, own=True)
+        self._within = within_variance(kept, codes).mean(axis=0)
+        sums, sizes = sums_of_groups(filled, codes)
+        of_means = (sums / sizes).var(axis=0, ddof=1).mean(axis=0)
+        self._between = np.maximum(of_means - self._within * (1 / counts).mean(), 0)
+        self._neighbours = self._near(own, mean)
+        of_others = mean_of_others(filled, codes)
+        self.held_out = np.full(len(kept), np.nan)
+        for i, code in enumerate(codes):
+            same = np.flatnonzero(codes == code)
+            # The next ones, the first after the last.
+            others = np.roll(same, -1 - np.searchsorted(same, i))[: min(len(own), len(same) - 1)]
+            if len(others):
+                near = self._near(kept[others], of_others[i])
+                self.held_out[i] = near.dissimilarity(kept[[i]])[0]
+        self.moments = log_moments(self.held_out[np.isfinite(self.held_out)])
+
+    def dissimilarity(self, performances):
+        """Dissimilarity of performances to the most similar own one, (n,)."""
+        return self._neighbours.dissimilarity(performances)
+
+    def limit(self, coverage):
+        """Largest dissimilarity that a share of the person's performances is expected to have."""
+        return self._neighbours.limit(self.moments, coverage)
+
+    def _near(self, own, mean):
+        """Neighbours of performances of one person, moved towards the mean of other people."""
+        own = fill_with_mean(own, self._mean)
+        ratio = self._between / (self._between + self._within / len(own))
+        moved = own + (ratio - 1) * (own.mean(axis=0) - mean)
+        one = np.zeros(len(own), dtype=np.intp)
+        return Neighbours(moved, one, mean=self._mean, weights=self._weights)
 
 
 def _sums_over(weights, a, b):
@@ -363,87 +409,6 @@ def _energies_of_seen(on_clock):
     apart = np.where(seen, np.square(values - centre), 0).sum(axis=(0, 1))
     variance = (apart / np.maximum(counts.sum(axis=0), 1)).sum()
     return own.sum(axis=1) / np.where(share > 0, share, 1), variance
-
-
-# -- logarithms of positive measures, taken for normal ------------------------------------
-
-
-@dataclass(frozen=True)
-class LogMoments:
-    """Number, mean and sum of squared deviations of the logarithms of values; they add up."""
-
-    n: int = 0
-    mean: float = 0.0
-    squares: float = 0.0
-
-    @classmethod
-    def of(cls, values):
-        """Those of values (n,) above 0."""
-        if not len(values):
-            return cls()
-        logs = np.log(values)
-        mean = logs.mean()
-        return cls(len(logs), float(mean), float(np.square(logs - mean).sum()))
-
-    def __add__(self, other):
-        if not self.n or not other.n:
-            return self if self.n else other
-        n, apart = self.n + other.n, other.mean - self.mean
-        squares = self.squares + other.squares + apart**2 * self.n * other.n / n
-        return LogMoments(n, self.mean + apart * other.n / n, squares)
-
-    def upper_limit(self, coverage, prior_variance=_PRIOR_VARIANCE):
-        """What a new value stays below with this probability."""
-        limit = t_prediction_limit(self.n, self.squares, coverage, prior_variance)
-        return float(np.exp(self.mean + limit))
-
-    def standardize(self, values, prior_variance=_PRIOR_VARIANCE):
-        """Deviations of the logarithms of values from the mean, in standard deviations."""
-        squares = self.squares + _PRIOR_COUNT * prior_variance
-        return (np.log(values) - self.mean) / np.sqrt(squares / (self.n + _PRIOR_COUNT))
-
-
-def log_moments(dissimilarities):
-    """The `LogMoments` of dissimilarities, of which those below 1e-9 are rounding."""
-    return LogMoments.of(np.maximum(dissimilarities, LEAST))
-
-
-def t_prediction_limit(n, squares, coverage, prior_variance=_PRIOR_VARIANCE):
-    """Upper prediction limit of a new normal value, less the mean, by Student's t distribution.
-
-    Parameters
-    ----------
-    n : int
-        Number of values.
-    squares : float
-        Sum of their squared deviations from the mean.
-    coverage : float
-        Probability that a new value is below the limit.
-    prior_variance : float, default=0.07
-        Counts like the variance of three values.
-
-    Returns
-    -------
-    float
-    """
-    freedom, scale = _prediction(n, squares, prior_variance)
-    return float(student.ppf(coverage, freedom) * scale)
-
-
-def t_prediction_tail(n, squares, value, prior_variance=_PRIOR_VARIANCE):
-    """The probability that a new value is above ``value``, which is given less the mean.
-
-    The parameters are those of `t_prediction_limit`.
-    """
-    freedom, scale = _prediction(n, squares, prior_variance)
-    return float(student.sf(value / scale, freedom))
-
-
-def _prediction(n, squares, prior_variance):
-    """Degrees of freedom, and standard error of a new value less the mean."""
-    freedom = n - 1 + _PRIOR_COUNT
-    squares = squares + _PRIOR_COUNT * prior_variance
-    return freedom, np.sqrt(squares / freedom * (1 + 1 / n))
 
 
 # -- performances that come one after the other: moments of all, and a sample of them --------

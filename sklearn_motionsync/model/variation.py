@@ -12,12 +12,10 @@ from ..body.limbs import unit_vectors
 from ..body.sphere import exp_map, log_map, mean_direction
 from ..matching.counting import first_smallest
 from ..matching.gaps import is_gappy
-from ..utils.groups import group_counts, mean_of_other_groups, mean_of_others, sums_of_groups
-from .similarity import t_prediction_limit
+from ..utils.groups import group_counts, mean_of_others, sums_of_groups
+from .acceptance import LogMoments
 
 __all__ = [
-    "PERFORMANCE",
-    "POSTURE",
     "clock_error",
     "mean_band",
     "predictive_variance",
@@ -67,13 +65,13 @@ def predictive_variance(performances, groups, shrinkage=_SHRINKAGE):
         Positive, also where performances do not differ.
     """
     n, codes = len(performances), _at_least_two(groups)
-    if is_gappy(performances):
-        squares = np.square(performances - mean_of_other_groups(performances, codes))
+    squares = np.square(performances - mean_of_others(performances, codes))
+    if is_gappy(squares):
         n = (~np.isnan(squares)).sum(axis=0)
         squares = np.nansum(squares, axis=0) / np.maximum(n, 1)
         n, squares = np.maximum(n, 1), np.where(n > 0, squares, np.nan)
     else:
-        squares = np.square(performances - mean_of_others(performances, codes)).mean(axis=0)
+        squares = squares.mean(axis=0)
     return np.maximum(_shrink(squares, n, shrinkage) * (1 + 1 / n), _floor(performances))
 
 
@@ -138,8 +136,7 @@ def simultaneous_factor(performances, groups, coverage):
     float
     """
     codes, prior = _at_least_two(groups), _PRIOR_VARIANCE
-    gaps = is_gappy(performances)
-    mean = (mean_of_other_groups if gaps else mean_of_others)(performances, codes)
+    mean = mean_of_others(performances, codes)
     largest = np.empty(len(performances))
     for group in range(codes.max() + 1):
         out = codes == group
@@ -153,8 +150,7 @@ def simultaneous_factor(performances, groups, coverage):
         largest[out] = np.fmax.reduce(np.abs(z), axis=(1, 2), initial=0)
     logs = np.log(np.maximum(largest, _LEAST))
     logs = np.maximum(logs, np.median(logs) - _BELOW_MEDIAN)
-    squares = np.square(logs - logs.mean()).sum()
-    return float(np.exp(logs.mean() + t_prediction_limit(len(logs), squares, coverage, prior)))
+    return LogMoments.of_logs(logs).upper_limit(coverage, prior)
 
 
 def mean_band(performances, groups, coverage, random_state=None):
@@ -269,13 +265,13 @@ def _floor(performances):
 # Shares of the variance of a sampled posture: of one training performance, of a mixture of all,
 # and of noise that is independent in every feature; a sampled performance has the first two. Noise
 # tangles limbs; the first keeps bodies in one piece and styles apart (docs/design.md).
-POSTURE = (0.84, 0.14, 0.02)
-PERFORMANCE = (0.64, 0.36)
+_POSTURE = (0.84, 0.14, 0.02)
+_PERFORMANCE = (0.64, 0.36)
 # A performance that is outside reaches its training performance in so many steps.
 _STEPS = 4
 
 
-def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=POSTURE):
+def sample_postures(mean, variance, deviations, n, n_std, random_state):
     """Sample postures at a frame, inside the envelope there.
 
     Each is near the posture of a training performance chosen at random. Before truncation their
@@ -295,8 +291,6 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=P
     n_std : float
         Half-width of the envelope, in standard deviations.
     random_state : RandomState
-    shares : tuple of 3 floats, default=(0.84, 0.14, 0.02)
-        Shares of the variance, of sum 1: of one training performance, a mixture, and noise.
 
     Returns
     -------
@@ -306,7 +300,7 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=P
     spread = deviations.std(axis=0)
     shapes = (deviations - deviations.mean(axis=0)) / np.where(spread > 0, spread, 1)
     own = random_state.randint(len(shapes), size=n)
-    one, mixed, noise = shares
+    one, mixed, noise = _POSTURE
     z = _mixtures(own, len(shapes), one, mixed, random_state) @ shapes
     z += np.sqrt(noise) * random_state.standard_normal(z.shape)
     std = np.sqrt(variance)
@@ -315,9 +309,7 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=P
     return np.clip(postures.astype(mean.dtype), lower, upper)
 
 
-def sample_performances(
-    mean, variance, deviations, n, dissimilarity, threshold, random_state, shares=PERFORMANCE
-):
+def sample_performances(mean, variance, deviations, n, dissimilarity, threshold, random_state):
     """Sample whole performances, of a dissimilarity up to a threshold.
 
     Each is a random mixture of the training performances' deviations, dominated by one that is
@@ -338,8 +330,6 @@ def sample_performances(
     threshold : float
         Largest dissimilarity inside.
     random_state : RandomState
-    shares : tuple of 2 floats, default=(0.64, 0.36)
-        Shares of the variance, of sum 1: of one training performance, and a mixture.
 
     Returns
     -------
@@ -353,7 +343,7 @@ def sample_performances(
     inside = np.flatnonzero(of_known <= threshold)
     centers = inside if len(inside) else np.array([first_smallest(of_known)])
     own = centers[random_state.randint(len(centers), size=n)]
-    weights = _mixtures(own, len(known), *shares, random_state)
+    weights = _mixtures(own, len(known), *_PERFORMANCE, random_state)
     drawn = np.tensordot(weights, known - known.mean(axis=0), axes=1)
     drawn *= _scale(variance, deviations)
     samples = space.performances(drawn)

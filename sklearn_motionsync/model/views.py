@@ -10,10 +10,13 @@ from sklearn.utils.validation import check_is_fitted
 from ..body.axes import convert_to_parent_axes
 from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import LIMB_NAMES, limb_indices, unit_vectors
-from ..inputs.collections import as_collection
+from ..inputs.collections import Performances, as_collection
 from ..inputs.features import as_features, names_of_features
-from ..inputs.validation import check_performances, labels_of_input
+from ..inputs.validation import check_performances, labels_of_input, names_of_input
 from ..matching.counting import first_largest
+from ..synchronizers.dense import DenseSynchronizer
+from ..synchronizers.linear import LinearSynchronizer
+from ..synchronizers.match import Match
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
     accepted_params,
@@ -44,6 +47,50 @@ __all__ = [
 _RESIDUAL_FACTOR = 4
 
 
+class Curves(NamedTuple):
+    """Performances on the clock of a model, each matched once.
+
+    Attributes
+    ----------
+    names : list of str
+        The features of ``whole``.
+    whole : ndarray (n_sequences, P, n_features)
+        The postures before an aSpace, if there is one; otherwise the features of the model.
+    points : performances
+        In the features of the model, checked.
+    match : Match or None
+        By the first synchronizer; None without one.
+    """
+
+    names: list
+    whole: np.ndarray
+    points: Performances
+    match: Match | None
+
+
+def curves_of(estimator, X, params, caller):
+    """Performances on the clock of the model of an estimator, with what an aSpace leaves out.
+
+    Parameters
+    ----------
+    estimator : ActionModel, or Pipeline with one
+        Fitted.
+    X : performances, as the estimator takes them
+    params : dict
+        What synchronizing X takes besides, such as ``keyframes``.
+    caller : str
+        The public function that the user called with (estimator, X), for messages.
+
+    Returns
+    -------
+    Curves
+    """
+    before, model = find_step(estimator, ActionModel)
+    names = names_of_features(before, model, model.mean_.shape[1])
+    route = _Route.without_aspace(None) if before is None else _Route.to(before, names)
+    return route.curves(model, X, params, caller, names)
+
+
 class View(NamedTuple):
     """A model in chosen features, and the performances that reach it.
 
@@ -59,10 +106,10 @@ class View(NamedTuple):
         The same with the residuals of an aSpace.
     labels : list
         Of these performances.
-    own : ActionModel
-        The model of the estimator, in its own features.
-    given : sequence of ndarray (P, n_own_features) or None
-        Performances in those, checked.
+    curves : Curves or None
+        The same performances as they reach the model of the estimator.
+    model_of_points : ActionModel
+        That model.
     residual_variance : ndarray (n_features,)
         Variance of a new person outside the aSpace.
     in_linear_time : ndarray (n_examples, P, n_known) or None
@@ -75,20 +122,15 @@ class View(NamedTuple):
     synchronised: np.ndarray | None
     whole: np.ndarray | None
     labels: list
-    own: ActionModel
-    given: tuple | None
+    curves: Curves | None
+    model_of_points: ActionModel
     residual_variance: np.ndarray
-    in_linear_time: np.ndarray | None = None
+    in_linear_time: np.ndarray | None
 
     @property
     def training(self):
         """Training performances that are kept, about the mean of all: (n_kept, P, n_features)."""
         return _training_of(self.model)
-
-    @property
-    def scores(self):
-        """Deviations of whole performances from the mean, in predicted standard deviations."""
-        return (self.whole - self.model.mean_) / self.predicted
 
     @property
     def predicted(self):
@@ -101,13 +143,8 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
 
     Parameters
     ----------
-    estimator : ActionModel, or Pipeline with one
-        Fitted.
-    X : performances, as the estimator takes them, default=None
-    params : dict, default=None
-        What synchronizing X takes besides, such as ``keyframes``.
-    caller : str, default=""
-        The public function that the user called with (estimator, X), for messages.
+    estimator, X, params, caller : as for `curves_of`, default=None
+        Without X there is the model alone.
     features : int, str or list of them, default=None
         If one of them is no feature of the model, the model is transformed back to the postures
         before its `ASpace`, by a fit on its training performances there, at most 64.
@@ -125,29 +162,25 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     """
     before, model = find_step(estimator, ActionModel)
     check_is_fitted(model, "threshold_")
-    names, params = names_of_features(before, model, model.mean_.shape[1]), params or {}
+    names = names_of_features(before, model, model.mean_.shape[1])
     is_needed = any(isinstance(f, str) and f not in names for f in as_features(features))
-    inverse = None
+    route = _Route.without_aspace(before)
     if before is not None and (is_needed or postures):
-        inverse = _find_inverse(before, names, is_needed)
-    checked, points, whole, labels = None, None, None, []
+        route = _Route.to(before, names, is_needed)
+    curves, points, labels = None, None, []
     if X is not None:
-        if inverse is None:
-            checked = model.check_performances(transform_through(before, X, params, caller))
-        else:
-            synchronised, whole = inverse.synchronise(X, params, caller)
-            checked = model.check_performances(synchronised)
-        points, labels = np.stack(checked), labels_of_input(X, checked)[0]
-    linear = _examples(before, inverse, len(names))
-    if inverse is None:
-        left_out = np.zeros(len(names))
-        return View(model, names, points, points, labels, model, checked, left_out, linear)
-    variance = _RESIDUAL_FACTOR * inverse.aspace.left_out_variance_
-    names = inverse.names(names)
+        curves = route.curves(model, X, params or {}, caller, names)
+        points, labels = np.stack(curves.points), labels_of_input(X, curves.points)[0]
+    linear = _examples(before, route, len(names))
+    if route.aspace is None:
+        variance = np.zeros(len(names))
+        return View(model, names, points, points, labels, curves, model, variance, linear)
+    variance = _RESIDUAL_FACTOR * route.aspace.left_out_variance_
+    names = route.names(names)
     variance = np.append(variance, np.zeros(len(names) - len(variance)))
-    back = clone(model).fit(inverse.transform(_training_of(model)), groups=model.groups_)
-    synchronised = None if points is None else inverse.transform(points)
-    return View(back, names, synchronised, whole, labels, model, checked, variance, linear)
+    back = clone(model).fit(route.transform(_training_of(model)), groups=model.groups_)
+    synchronised, whole = (None, None) if X is None else (route.transform(points), curves.whole)
+    return View(back, names, synchronised, whole, labels, curves, model, variance, linear)
 
 
 def _training_of(model):
@@ -156,7 +189,7 @@ def _training_of(model):
     return model.mean_ + deviations - deviations.mean(axis=0)
 
 
-def _examples(before, inverse, n_features):
+def _examples(before, route, n_features):
     """Training performances in linear time, in features of the model or in postures; or None."""
     try:
         synchronizer = find_synchronizer(before)[1] if before is not None else None
@@ -166,63 +199,60 @@ def _examples(before, inverse, n_features):
     examples = getattr(synchronizer, "examples_", getattr(inner, "examples_", None))
     if examples is None:
         return None
-    if inverse is None:
+    if route.aspace is None:
         steps = flat_steps(before)
         return examples if steps[-1] is synchronizer and examples.shape[2] <= n_features else None
-    fits = examples.shape[2] == len(inverse.aspace.components_)
-    return inverse.transform(examples) if fits else None
+    fits = examples.shape[2] == len(route.aspace.components_)
+    return route.transform(examples) if fits else None
 
 
-class Curves(NamedTuple):
-    """Performances on the clock of a model.
+class _Route(NamedTuple):
+    """The steps to a model: those before an aSpace or a synchronizer, the aSpace, and the others.
 
-    Attributes
-    ----------
-    names : list of str
-        The features of ``whole``.
-    whole : ndarray (n_sequences, P, n_features)
-        The postures before an aSpace, if there is one; otherwise the same.
-    """
-
-    names: list
-    whole: np.ndarray
-
-
-def curves_of(estimator, X, params, caller):
-    """Performances on the clock of the model of an estimator, with what an aSpace leaves out.
-
-    Parameters
-    ----------
-    estimator, X, params, caller : as for `view_of`
-
-    Returns
-    -------
-    Curves
-    """
-    before, model = find_step(estimator, ActionModel)
-    names = names_of_features(before, model, model.mean_.shape[1])
-    inverse = None if before is None else _find_inverse(before, names, is_needed=False)
-    if inverse is None:
-        checked = model.check_performances(transform_through(before, X, params, caller))
-        return Curves(names, np.stack(checked))
-    return Curves(inverse.names(names), inverse.synchronise(X, params, caller)[1])
-
-
-class _Inverse(NamedTuple):
-    """The aSpace of a pipeline, the steps before it, and the synchronizers after it.
-
-    Features that these append to the points of the aSpace, such as a `TimingChannel`, are kept.
+    Without an aSpace there is no way back from the model. Features that synchronizers append to
+    the points of an aSpace, such as a `TimingChannel`, are kept on the way.
     """
 
     before: Pipeline | None
-    aspace: ASpace
+    aspace: ASpace | None
     after: list
 
-    def names(self, own):
-        """The features of postures, and those beside the points of the aSpace, of ``own``."""
+    @classmethod
+    def to(cls, before, names, is_needed=False):
+        """The route to a model of these features, by way of an aSpace if there is one.
+
+        One that is needed must have a way back: synchronizers alone stand behind it.
+        """
+        try:
+            before_aspace, aspace = find_step(before, ASpace)
+        except ValueError:
+            if is_needed:
+                raise
+            return cls.without_aspace(before)
+        steps = flat_steps(before)
+        after = steps[steps.index(aspace) + 1 :]
+        without_match = [step for step in after if not hasattr(step, "match")]
+        if without_match and is_needed:
+            raise ValueError(
+                f"Between ASpace and ActionModel stands {without_match[0]}, which has no inverse: "
+                f"choose features of the model, {', '.join(names)}."
+            )
+        return cls.without_aspace(before) if without_match else cls(before_aspace, aspace, after)
+
+    @classmethod
+    def without_aspace(cls, before):
+        """The route by which all that stands before the model is its own."""
+        steps = [] if before is None else flat_steps(before)
+        first = [k for k, step in enumerate(steps) if hasattr(step, "match")]
+        count = first[0] if first else len(steps)
+        named = [(f"step{k}", step) for k, step in enumerate(steps[:count])]
+        return cls(Pipeline(named) if named else None, None, steps[count:])
+
+    def names(self, names_of_model):
+        """The features of postures, and those of the model beside the points of the aSpace."""
         aspace = self.aspace
         of_postures = names_of_features(self.before, aspace, aspace.n_features_in_)
-        return [*of_postures, *own[len(aspace.components_) :]]
+        return [*of_postures, *names_of_model[len(aspace.components_) :]]
 
     def transform(self, points):
         """Postures of points of the aSpace."""
@@ -230,39 +260,46 @@ class _Inverse(NamedTuple):
         points, beside = np.split(points, [len(components)], axis=2)
         return np.concatenate([points @ components + mean, beside], axis=2)
 
-    def synchronise(self, X, params, caller):
-        """The performances that reach the model, and their postures on the same clock."""
-        takers = [method for step in self.after for method in (step.match, step.transform)]
-        postures = transform_through(self.before, X, params, caller, also=takers)
-        whole = check_performances(
-            self.aspace, postures, reset=False, level="posture", finite="allow-nan"
-        )
-        points = self.aspace.transform(postures)
+    def curves(self, model, X, params, caller, names):
+        """The `Curves` of performances."""
+        methods = [(step, name) for step in self.after for name in ("match", "transform")]
+        takers = [getattr(step, name) for step, name in methods if hasattr(step, name)]
+        points = transform_through(self.before, X, params, caller, also=takers)
+        whole, first = None, None
+        if self.aspace is not None:
+            whole = check_performances(
+                self.aspace, points, reset=False, level="posture", finite="allow-nan"
+            )
+            points = self.aspace.transform(points)
+        # Names are those of tables, which a match does not make.
+        once = names_of_input(model) is None
         with explain_missing(caller):
             for step in self.after:
-                whole = step.match(points, **accepted_params(step.match, params)).warp(whole)
-                points = step.transform(points, **accepted_params(step.transform, params))
+                points, match = _through(step, points, params, once)
+                whole = whole if whole is None or match is None else match.warp(whole)
+                first = match if first is None else first
+        checked = model.check_performances(points)
+        if whole is None:
+            return Curves(names, np.stack(checked), checked, first)
         beside = np.stack(as_collection(points))[:, :, len(self.aspace.components_) :]
-        return points, np.concatenate([np.stack(whole), beside], axis=2)
+        whole = np.concatenate([np.stack(whole), beside], axis=2)
+        return Curves(self.names(names), whole, checked, first)
 
 
-def _find_inverse(before, names, is_needed):
-    """The inverse from a model to postures; None if there is none and it is not needed."""
-    try:
-        before_aspace, aspace = find_step(before, ASpace)
-    except ValueError:
-        if is_needed:
-            raise
-        return None
-    steps = flat_steps(before)
-    after = steps[steps.index(aspace) + 1 :]
-    without_match = [step for step in after if not hasattr(step, "match")]
-    if without_match and is_needed:
-        raise ValueError(
-            f"Between ASpace and ActionModel stands {without_match[0]}, which has no inverse: "
-            f"choose features of the model, {', '.join(names)}."
-        )
-    return None if without_match else _Inverse(before_aspace, aspace, after)
+def _through(step, points, params, once):
+    """Performances after a step, and their match if it makes one.
+
+    Synchronizers that only warp match them once, where tables are not asked for.
+    """
+    match, accepted = None, accepted_params(step.transform, params)
+    if hasattr(step, "match"):
+        only_warps = isinstance(step, DenseSynchronizer | LinearSynchronizer)
+        if once and only_warps and type(points) in (list, np.ndarray):
+            points = step.check_performances(points)
+        match = step.match(points, **accepted_params(step.match, params))
+        if isinstance(points, Performances) and points.kind != "rows":
+            return match.warp(points), match
+    return step.transform(points, **accepted), match
 
 
 # -- limbs -----------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from sklearn.base import BaseEstimator
 from ..body.skeleton import Skeleton
 from ..comparison.curves import AlignedCurves
 from ..comparison.groups import compare_aligned
+from ..comparison.study import Study
 from ..display.drawing import WIDTH, curves, front_line, group_styles, legend_above, panels, pyplot
 from ..display.groups import display_of_groups
 from ..display.synchronization import SynchronizationDisplay
@@ -173,14 +174,8 @@ def write_report(
         )
         comparison = figure = None
         if groups is not None or covariate is not None or paired:
-            comparison = compare_aligned(
-                aligned,
-                groups,
-                covariate=covariate,
-                people=people,
-                paired=paired,
-                random_state=random_state,
-            )
+            study = Study.of(groups, covariate, people, paired, len(aligned.curves))
+            comparison = compare_aligned(aligned, study, random_state=random_state)
             display = display_of_groups(aligned, groups, people, comparison, features=features)
             figure = display.plot().figure_
         trials = TrialSet.of(X, aligned, frame_rate, groups, people, covariate)

@@ -7,14 +7,8 @@ from scipy.stats import norm
 from ..matching.counting import first_largest
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.warps import even_slices, normalise
-from ..model.similarity import (
-    DIFFERENCES,
-    LEAST,
-    LogMoments,
-    Neighbours,
-    log_moments,
-    movement_energies,
-)
+from ..model.acceptance import LEAST, LogMoments, log_moments
+from ..model.similarity import Neighbours, distances_by_differences, movement_energies
 from ..utils.groups import encode_groups
 
 __all__ = ["WindowDissimilarity", "example_indices", "random_movements"]
@@ -94,7 +88,7 @@ class WindowDissimilarity:
             )
         self._energy = LogMoments.of(energy).standardize
         codes, _ = encode_groups(groups, count, at_least=min(count, 2))
-        self._neighbours = Neighbours(positions, codes, self._features, DIFFERENCES)
+        self._neighbours = Neighbours(positions, codes, self._features, distances_by_differences)
         self._training, self.known = positions, np.empty(0)
         if count > 1:
             self.known = self._measure(positions, lengths[example_indices(synchronizer)], codes)

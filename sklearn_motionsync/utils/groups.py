@@ -9,12 +9,13 @@ import pandas as pd
 from sklearn.utils import assert_all_finite, check_consistent_length, column_or_1d
 from sklearn.utils.multiclass import check_classification_targets
 
+from ..matching.gaps import is_gappy
+
 __all__ = [
     "add_unknown_label",
     "encode_classes",
     "encode_groups",
     "group_counts",
-    "mean_of_other_groups",
     "mean_of_others",
     "names_of_groups",
     "sums_of_groups",
@@ -211,24 +212,22 @@ def sums_of_groups(values, codes):
 
 
 def mean_of_others(values, codes):
-    """For each of the values (n, ...), the mean of those of all other groups."""
-    sums, counts = sums_of_groups(values, codes)
-    return ((sums.sum(axis=0) - sums) / (len(values) - counts))[codes]
+    """For each of the values (n, ...), the mean of those of all other groups.
+
+    Gaps (NaN) count in no mean; one of nothing is NaN.
+    """
+    sums, counts = sums_of_groups(np.nan_to_num(values), codes)
+    if is_gappy(values):
+        counts = group_counts(values, codes)
+    counts = counts.sum(axis=0) - counts
+    means = np.full(sums.shape, np.nan)
+    np.divide(sums.sum(axis=0) - sums, counts, out=means, where=counts > 0)
+    return means[codes]
 
 
 def group_counts(performances, codes):
     """How many performances of each group show each value: (n_groups, P, n_features)."""
     return sums_of_groups(~np.isnan(performances), codes)[0]
-
-
-def mean_of_other_groups(performances, codes):
-    """For each performance with gaps, the mean of what those of all other groups show, or NaN."""
-    counts = group_counts(performances, codes)
-    sums, _ = sums_of_groups(np.nan_to_num(performances), codes)
-    counts = counts.sum(axis=0) - counts
-    means = np.full(sums.shape, np.nan)
-    np.divide(sums.sum(axis=0) - sums, counts, out=means, where=counts > 0)
-    return means[codes]
 
 
 def _check_held(column, labels):

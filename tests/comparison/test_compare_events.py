@@ -36,7 +36,7 @@ def test_means_spreads_and_sizes_are_those_of_people():
 
 def test_p_of_one_event_is_that_of_a_permutation_test():
     events = K[["valley of the force"]]
-    found = compare_events(GAIT.data, events, **GIVEN, n_permutations=4999)
+    found = compare_events(GAIT.data, events, **GIVEN, n_permutations=1999)
     values = of_people()[:, [list(K).index("valley of the force")]][:, 0]
     exact = stats.permutation_test(
         (values[::2], values[1::2]),
@@ -44,18 +44,18 @@ def test_p_of_one_event_is_that_of_a_permutation_test():
         n_resamples=np.inf,
         alternative="greater",
     )
-    assert found["p"].iloc[0] == pytest.approx(exact.pvalue, abs=0.015)
+    assert found["p"].iloc[0] == pytest.approx(exact.pvalue, abs=0.02)
 
 
 def test_the_level_holds_over_all_events():
-    """By chance 2 of 20 studies; more than 6 come in one of 400 series."""
+    """By chance 1 of 10 studies; more than 4 come in one of 600 series."""
     rng, wrong = np.random.default_rng(0), 0
     X = [np.zeros((101, 1)) for _ in range(12)]
-    for seed in range(20):
+    for seed in range(10):
         events = np.sort(rng.uniform(1, 99, (12, 4)))
         given = {"level": 0.1, "n_permutations": 99, "random_state": seed}
         wrong += compare_events(X, events, ["a", "b"] * 6, **given)["differs"].any()
-    assert wrong <= 6
+    assert wrong <= 4
 
 
 def test_a_table_in_seconds_without_groups():

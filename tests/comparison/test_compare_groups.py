@@ -10,8 +10,7 @@ from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer, compare_groups
-from sklearn_motionsync.comparison.permutation import Design, enhanced, families, scaled
-from sklearn_motionsync.comparison.study import Study
+from sklearn_motionsync.comparison.study import Design, Study, enhanced, families, scaled
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.utils.parallel import Progress
 
@@ -96,7 +95,7 @@ def test_p_values_of_one_value_are_those_of_a_permutation_test():
     y = rng.standard_normal(14) + np.repeat([0, 0.9], 7)
     design = Study.of(np.repeat(["a", "b"], 7).tolist(), None, None, False, 14).design
     curve, quiet = y[:, np.newaxis, np.newaxis], Progress(None, 0)
-    found = families(design, [curve], 4999, rng, progress=quiet)[0].p_value
+    found = families(design, [curve], 1999, rng, progress=quiet)[0].p_value
     exact = stats.permutation_test(
         (y[:7], y[7:]),
         lambda a, b: abs(a.mean() - b.mean()),
@@ -113,7 +112,7 @@ def test_p_values_of_one_value_are_those_of_a_permutation_test():
 def test_a_difference_in_timing_is_called_timing(late):
     gait, pipe = late
     found = compare_groups(
-        pipe, gait.data, gait.group, people=gait.person, signals=gait.data, n_permutations=499
+        pipe, gait.data, gait.group, people=gait.person, signals=gait.data, n_permutations=199
     )
     assert found.to_frame()["differs"].tolist() == [True, False, True, True]
     assert set(found.clusters["what"]) == {"timing"}
@@ -129,7 +128,7 @@ def test_a_difference_in_timing_is_called_timing(late):
 def test_a_difference_in_shape_is_called_shape_in_its_unit():
     gait, pipe = studied(24, amplitude=18)
     found = compare_groups(
-        pipe, gait.data, gait.group, people=gait.person, signals=gait.data, n_permutations=499
+        pipe, gait.data, gait.group, people=gait.person, signals=gait.data, n_permutations=199
     )
     answers = found.to_frame()["differs"]
     assert answers[["joint", "shape"]].all()
@@ -149,7 +148,7 @@ def test_a_bump_in_one_of_four_signals_is_not_called_timing():
         bump = 20 * np.exp(-(((t - 0.2) / 0.06) ** 2) / 2) * (group == "B")
         trials.append(x + bump[:, np.newaxis] * [0, 1, 0, 0])
     pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(trials)
-    given = {"groups": gait.group, "people": gait.person, "n_permutations": 499}
+    given = {"groups": gait.group, "people": gait.person, "n_permutations": 199}
     found = compare_groups(pipe, trials, **given)
     assert found.p_timing < 0.05  # the offsets do differ
     assert set(found.clusters["what"]) == {"shape"}
@@ -174,7 +173,7 @@ def test_a_constant_signal_leaves_timing_what_it_is(late):
 
 def test_nothing_is_found_where_nothing_differs():
     gait, pipe = studied(16)
-    found = compare_groups(pipe, gait.data, gait.group, people=gait.person, n_permutations=499)
+    found = compare_groups(pipe, gait.data, gait.group, people=gait.person, n_permutations=99)
     assert found.p_joint > 0.05
     assert len(found.clusters) == 0
     assert "no difference is found" in repr(found)
@@ -220,7 +219,7 @@ def test_designs_find_a_later_bump_and_a_higher_one(design):
     rng, n = np.random.default_rng(5), 12
     people = np.repeat(np.arange(n), 2)
     second = np.tile([0, 1], n)
-    given = {"people": people.tolist(), "n_permutations": 499}
+    given = {"people": people.tolist(), "n_permutations": 199}
     if design == "paired":
         by, given = second, {**given, "groups": second.tolist(), "paired": True}
     elif design == "within":

@@ -105,7 +105,7 @@ def test_a_constant_feature_does_not_hide_the_others(performances):
     assert model.accepts(model.sample(5, frame=2, random_state=0), 2).all()
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_the_unit_of_the_features_changes_nothing(performances, scale):
     """Densities change by the Jacobian, decisions do not; also of identical performances."""
     same = np.repeat(performances[:1], 4, axis=0)
@@ -127,16 +127,6 @@ def test_model_of_identical_performances(value):
     assert model.predict(X).tolist() == [1, 1, 1]
     np.testing.assert_array_equal(model.sample(2, random_state=0), X[:2])
     assert model.predict([np.full((5, 2), value + 1 + value)]).tolist() == [-1]
-
-
-def test_fit_refuses_unsynchronised_performances():
-    with pytest.raises(ValueError, match="Performance 1 has 6 frames, performance 0 has 5"):
-        ActionModel().fit([np.ones((5, 2)), np.ones((6, 2))])
-
-
-def test_score_samples_refuses_another_clock(model):
-    with pytest.raises(ValueError, match="have 16 frames, the model 15"):
-        model.score_samples(np.zeros((2, 16, 3)))
 
 
 @pytest.mark.parametrize("frame", [-1, 15, 2.5, "3"])

@@ -62,14 +62,14 @@ def expectation():
         for x in (rng.standard_normal((n, 2 * n)) for n in (K, 3))
     )
     mean, variance = people(2, 1)[0][0], rng.uniform(0.5, 2, (K, 3))
-    made = Expectation(mean, variance, over_time, between, PARTS)
+    windows, lags = windows_of(K)[0], np.array([-3, 2])
+    made = Expectation(mean, variance, over_time, between, PARTS, windows[:40], lags)
     return made, np.kron(over_time, between), 1 / np.sqrt(variance)
 
 
 def test_gains_equal_those_of_the_whole_precision_matrix(expectation):
     made, precision, scale = expectation
     windows, _ = windows_of(K)
-    made.seek_windows(windows[:40]).seek_lags(np.array([-3, 2])).seek_amplitudes()
     deviations = np.random.default_rng(1).standard_normal((K, 3))
     z, weighed = (deviations * scale).ravel(), made.weigh(deviations)
     gains, changes = made.of_windows(weighed)

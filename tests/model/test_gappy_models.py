@@ -19,7 +19,7 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.filters import smooth
 from sklearn_motionsync.model import similarity
-from sklearn_motionsync.model.variation import mean_band, predictive_variance, simultaneous_factor
+from sklearn_motionsync.model.variation import mean_band, predictive_variance
 from test_similarity import slow_weights
 
 P = 40
@@ -83,7 +83,7 @@ def test_density_is_the_marginal_one_of_what_was_seen(gaps):
 def test_without_gaps_nothing_goes_the_other_way(monkeypatch):
     X = performances(8)
     whole = ActionModel().fit(X)
-    names = ["fill_with_mean", "group_counts", "mean_of_other_groups"]
+    names = ["fill_with_mean", "group_counts"]
     for module in ("action_model", "similarity", "variation"):
         for name in names:
             monkeypatch.setattr(f"sklearn_motionsync.model.{module}.{name}", None, raising=False)
@@ -141,26 +141,10 @@ def test_predictive_variance_leaves_groups_out_value_by_value(people):
     )
 
 
-def test_simultaneous_bands_hold_what_is_seen_of_new_people():
-    """About as many of the performances of new people as without gaps."""
-    held = {"whole": [], "gaps": []}
-    for seed in range(20):
-        X = performances(11, seed=seed)
-        for name, some in (("whole", X), ("gaps", hide(X, seed=seed))):
-            known, new = some[:10], some[10:]
-            codes = np.arange(10)
-            std = np.sqrt(predictive_variance(known, codes))
-            z = (new - np.nanmean(known, axis=0)) / std
-            held[name].append(np.nanmax(np.abs(z)) <= simultaneous_factor(known, codes, 0.8))
-    whole, of_gaps = np.mean(held["whole"]), np.mean(held["gaps"])
-    assert 0.7 < whole < 0.95
-    assert abs(of_gaps - whole) <= 0.1
-
-
 def test_bands_of_the_mean_hold_it_and_are_wider_where_few_were_seen():
     truth = performances(4000, seed=99).mean(axis=0)
     held = []
-    for seed in range(40):
+    for seed in range(20):
         X = performances(8, seed=seed)
         X[:5, 10:20, 1] = np.nan
         half = mean_band(X, np.arange(8), 0.9, 0)
@@ -238,8 +222,6 @@ def test_one_path_a_performance(gaps):
 
 def test_scores_postures_and_samples(gaps):
     model = ActionModel().fit(gaps)
-    scores = model.standard_scores(gaps)
-    np.testing.assert_array_equal(np.isnan(scores), np.isnan(gaps))
     assert np.isfinite(model.deviations_).all()
     assert np.isfinite(model.sample(3, random_state=0)).all()
     assert np.isfinite(model.sample(3, frame=5, random_state=0)).all()
@@ -340,7 +322,7 @@ def test_departures_of_a_pipeline_are_those_of_limbs_that_were_seen():
     """The aSpace expects a hidden arm; a departure is nevertheless only where it was seen."""
     bunch = make_bending(12, random_state=0)
     cosines = DirectionCosines(bunch.skeleton, hidden="nan")
-    pipe = make_pipeline(cosines, ASpace(0.95), DenseSynchronizer(50), ActionModel())
+    pipe = make_pipeline(cosines, ASpace(0.95), DenseSynchronizer(30), ActionModel())
     pipe.fit(bunch.data)
     wrist = 3 * bunch.skeleton.index_of("right_wrist")
     new = bunch.data[2].copy()

@@ -22,7 +22,7 @@ from test_similarity import (
     slow_weights,
 )
 
-few = settings(max_examples=12, deadline=None, derandomize=True, database=None)
+few = settings(max_examples=8, deadline=None, derandomize=True, database=None)
 
 
 def in_portions(X, groups=None, cuts=(), model=None):
@@ -65,7 +65,7 @@ def test_partial_fits_equal_one_fit_to_the_last_bit(data):
     assert_same_state(model, expected)
     assert model.threshold_ == expected.threshold_
     new = curves(5, seed=7, spread=0.4, n_frames=12).astype(X.dtype)
-    for ask in ("predict", "decision_function", "score_samples", "standard_scores"):
+    for ask in ("predict", "decision_function", "score_samples"):
         np.testing.assert_array_equal(getattr(model, ask)(new), getattr(expected, ask)(new))
     for frame in (None, 4):
         drawn = [m.sample(3, frame=frame, random_state=0) for m in (model, expected)]
@@ -73,11 +73,11 @@ def test_partial_fits_equal_one_fit_to_the_last_bit(data):
     np.testing.assert_array_equal(model.envelope(True), expected.envelope(True))
 
 
-@pytest.mark.parametrize("size", [1, 7, 100])
+@pytest.mark.parametrize("size", [1, 50])
 def test_kept_performances_do_not_depend_on_portions(size):
-    X, groups = curves(130, n_frames=10), np.arange(130) ** 2 // 400
+    X, groups = curves(80, n_frames=10), np.arange(80) ** 2 // 150
     for some in (None, groups):
-        model = in_portions(X, some, range(0, 130, size))
+        model = in_portions(X, some, range(0, 80, size))
         assert_same_state(model, ActionModel().fit(X, groups=some))
         assert len(model.groups_) == 64
 
@@ -182,8 +182,8 @@ def test_a_single_group_gives_moments_only(groups):
     check_is_fitted(model)
     np.testing.assert_allclose(model.mean_, X[:n].mean(axis=0))
     np.testing.assert_allclose(model.variance_, X[:n].var(axis=0), atol=1e-15)
-    methods = dict.fromkeys(["predict", "score_samples", "standard_scores"], (X,))
-    methods |= {"threshold_at": [0.5], "accepts": [X[0, :2], 0], "check_performances": [X]}
+    methods = dict.fromkeys(["predict", "score_samples", "dissimilarity"], (X,))
+    methods |= {"accepts": [X[0, :2], 0], "check_performances": [X]}
     methods |= dict.fromkeys(["envelope", "mean_envelope", "simultaneous_factor", "sample"], ())
     for name, arguments in methods.items():
         with pytest.raises(NotFittedError, match=f"2 performances, .* has seen {n}, of one"):

@@ -5,7 +5,7 @@ import pytest
 from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ActionDetector, ActionModel, ASpace, DenseSynchronizer
-from sklearn_motionsync.model.personal import PersonalReference
+from sklearn_motionsync.model.similarity import PersonalReference
 from test_similarity import slow_threshold, slow_velocity
 
 P = 40
@@ -78,7 +78,6 @@ def test_dissimilarity_and_threshold_equal_slow_loops(m):
         others = [5 * (i // 5) + (i + k) % 5 for k in range(1, m + 1)]
         left.append(nearest(y, X[others], X[GROUPS[i] != GROUPS].mean(axis=0)))
     limit = slow_threshold(left, 0.9)
-    np.testing.assert_allclose(model.threshold_at(0.9, reference=own), limit, rtol=1e-9)
     decisions = model.decision_function(new, reference=own)
     np.testing.assert_allclose(decisions, np.log(limit / np.array(expected)), atol=1e-8)
     signs = np.where(decisions >= 0, 1, -1)
@@ -102,8 +101,6 @@ def test_a_reference_needs_people_who_come_twice():
     for ask in (model.predict, model.dissimilarity, model.decision_function):
         with pytest.raises(ValueError, match="no group of the training set has two performances"):
             ask(X, reference=NEW[:2])
-    with pytest.raises(ValueError, match=r"reference needs .* give groups to fit"):
-        model.threshold_at(0.9, reference=NEW[:2])
     found = ActionModel().fit(X, groups=GROUPS)
     with pytest.raises(ValueError, match="The performances have 7 frames, the model 40"):
         found.predict(X, reference=NEW[:2, :7])
@@ -147,9 +144,7 @@ def test_a_detector_takes_a_reference_as_it_was_recorded():
     own = match.warp(raw(mine[:3], 6))
     new = raw([*mine[3:], *bent], 5)
     warped = detector.estimator_[1].match(detector.estimator_[0].transform(new)).warp(new)
-    unlike = model.dissimilarity(warped, reference=own) / model.threshold_at(
-        model.coverage, reference=own
-    )
+    unlike = np.exp(-model.decision_function(warped, reference=own))
     np.testing.assert_allclose(report["own"], unlike, rtol=1e-8)
 
 
@@ -170,7 +165,7 @@ def test_exercises_of_people_done_right_and_wrong(benchmark, real_data):
         def some(rows):
             return [postures[i] for i in rows]
 
-        pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(60), ActionModel())
+        pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(40), ActionModel())
         pipe.fit(some(train), actionmodel__groups=people[train])
         steps, model = pipe[:-1], pipe[-1]
         wrong, new = ~correct[rest], steps.transform(some(rest))

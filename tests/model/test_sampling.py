@@ -6,10 +6,8 @@ from scipy.stats import truncnorm
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
-    ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    Skeleton,
 )
 from sklearn_motionsync.model.variation import (
     TangentSpace,
@@ -90,8 +88,8 @@ def test_deviations_of_a_part_of_the_training_set_are_centred():
 
 @pytest.mark.parametrize("n_std", [0.3, 1.5])
 def test_normal_features_are_cut_off_like_normal_distributions(n_std):
-    X = np.random.default_rng(0).standard_normal((2000, 2)) @ [[1.0, 0.9], [0.0, 0.1]]
-    drawn = postures_of(X, n_std=n_std)
+    X = np.random.default_rng(0).standard_normal((1000, 2)) @ [[1.0, 0.9], [0.0, 0.1]]
+    drawn = postures_of(X, 8000, n_std)
     assert inside(drawn, X, n_std)
     expected = X.std(axis=0) * truncnorm(-n_std, n_std).std()
     np.testing.assert_allclose(drawn.std(axis=0), expected, rtol=0.03)
@@ -227,13 +225,6 @@ def test_variance_of_samples_is_scaled_by_at_most_four():
         assert (np.abs(drawn.mean(axis=0) - mean) < 0.06 * drawn.std(axis=0)).all()
 
 
-def test_samples_repeat_with_their_random_state():
-    for draw in (postures_of, performances_of):
-        X = waves(9) if draw is performances_of else waves(9)[:, 3]
-        np.testing.assert_array_equal(draw(X, 4, seed=3), draw(X, 4, seed=3))
-        assert not np.array_equal(draw(X, 4, seed=3), draw(X, 4, seed=4))
-
-
 # -- directions -------------------------------------------------------------------------
 
 
@@ -278,14 +269,6 @@ def test_tangent_space_inverts_itself_and_leaves_out_what_is_no_tangent():
     np.testing.assert_allclose(space.performances(along), back, atol=1e-12)
 
 
-def test_directions_moved_inside_keep_their_length():
-    X = turning(12)
-    unlike = to_nearest(X)
-    drawn = performances_of(X, dissimilarity=unlike, threshold=0.02)
-    assert (unlike(drawn) <= 0.02).all()
-    np.testing.assert_allclose(norms(drawn), 1, atol=1e-12)
-
-
 def test_directions_in_finds_unit_vectors():
     X = turning()
     found = [(c.start, c.stop) for c in directions_in(X)]
@@ -321,60 +304,6 @@ def test_directions_have_the_length_1_but_for_short_ones(share, length, is_direc
 
 
 # -- people -----------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def bends_on_one_clock(bends):
-    space = make_pipeline(DirectionCosines(bends.skeleton), ASpace(0.95))
-    points = space.fit_transform(bends.data)
-    return space, np.asarray(DenseSynchronizer(n_frames=100).fit_transform(points), dtype=float)
-
-
-def built(space, mean, points):
-    """Bodies (n, joint names: (n, 3)) with the hips where those of the mean performance are."""
-    at = Skeleton.paper().joints.index
-
-    def bodies(x):
-        return np.asarray(space.inverse_transform(x)).reshape(len(x), 15, 3)
-
-    def below(x):
-        return (x[:, at("left_hip"), 1] + x[:, at("right_hip"), 1]) / 2 - x[:, at("pelvis"), 1]
-
-    floor, usual = bodies(mean)[..., 1].min(), below(bodies(mean)).mean()
-    found = bodies(np.concatenate([mean, points]))[len(mean) :]
-    moved = below(found) - usual
-    joints = {name: found[:, at(name)].copy() for name in Skeleton.paper().joints}
-    for name in ("left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle"):
-        joints[name][:, 1] -= moved
-    for joint in joints.values():
-        joint[:, 1] -= floor
-    return joints
-
-
-def crossed(joints):
-    """How far each left knee is on the right one's side, along the line of the hips."""
-    across = joints["left_hip"] - joints["right_hip"]
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return -((joints["left_knee"] - joints["right_knee"]) * across).sum(axis=1)
-
-
-def test_sampled_bends_are_bodies(bends_on_one_clock):
-    """200 samples a frame: no foot deep in the floor, no thighs through each other."""
-    space, X = bends_on_one_clock
-    mean, variance, deviations = moments(X)
-    ankles, knees, hands = [], [], []
-    for f in range(100):
-        drawn = sample_postures(
-            mean[f], variance[f], deviations[:, f], 200, 3.0, np.random.RandomState(f)
-        )
-        joints = built(space, mean, drawn)
-        ankles.append([joints[f"{side}_ankle"][:, 1] for side in ("left", "right")])
-        hands.append([joints[f"{side}_wrist"][:, 1] for side in ("left", "right")])
-        knees.append(crossed(joints))
-    # In metres. Drawn feature by feature: -0.17, -0.8, and 0.06 crossed.
-    assert np.min(ankles) > -0.10
-    assert np.min(hands) > -0.20
-    assert np.max(knees) < 0
 
 
 def test_sampled_performances_of_cosines_have_whole_limbs(bends):

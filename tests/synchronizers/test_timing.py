@@ -173,7 +173,8 @@ def test_model_displays_show_the_channel_beside_postures(bunch):
     found = find_departures(pipe, strange, features="offset", limit=0.1)
     assert set(found["feature"]) == {"offset"}
     found = found.groupby("performance").head(1)
-    scores = pipe[-1].standard_scores(pipe[:-1].transform(strange))[:, :, -1]
+    deviations = (pipe[:-1].transform(strange) - pipe[-1].mean_)[:, :, -1]
+    scores = deviations / np.sqrt(pipe[-1].predictive_variance_[:, -1])
     inside = [
         np.abs(scores[row.performance, row.first : row.last + 1]) for row in found.itertuples()
     ]
