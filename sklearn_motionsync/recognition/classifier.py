@@ -16,7 +16,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.types import Cost, Labels, PerformancesLike, ValuesLike
+from ..inputs.types import Cost, Labels, PerformancesLike
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.costs import COSTS
 from ..matching.counting import first_largest
@@ -26,14 +26,15 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import add_unknown_label, encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
 from ..utils.parameters import validated
-from .distances import SETTINGS
+from .distances import PairwiseDistance
 from .kernel import MotionKernel, assign_folds, decision_values, fit_regression
-from .pairwise import PairwiseDistance
 
 __all__ = ["ActionClassifier"]
 
 # The coverage of reject_below="auto".
 _COVERAGE = 0.95
+# Largest offset of the distances, as a share of the clock.
+_MAX_OFFSET = 0.4
 # The golden ratio less 1.
 _GOLDEN = (5**0.5 - 1) / 2
 
@@ -82,15 +83,6 @@ class ActionClassifier(
         only, chosen evenly from all classes and groups (Nyström's method). None compares all.
     n_frames : int, default=50
         ``P``, frames of the common clock. Time grows with its square.
-    velocity_smoothing : float, default=0.06
-        Standard deviation of the Gaussian under which velocities are estimated, as a share of the
-        performance.
-    max_offset : float, default=0.4
-        Largest offset, as a share of the clock, in [0, 1].
-    smoothness : float, default=0.003
-        Weight of changes of pace, in units of the mean squared norm of the compared features.
-    max_rate : float, default=4
-        Largest local rate of a path.
     reject_below : float, "auto" or None, default=None
         Performances whose largest decision value is below get ``unknown_label``; None rejects
         nothing. ``"auto"`` is ``threshold_at(0.95)``. ``fit`` does not use it: it can be set
@@ -163,9 +155,11 @@ class ActionClassifier(
         "gamma": [Interval(Real, 0, None, closed="neither")],
         "summaries": ["boolean"],
         "n_landmarks": [Interval(Integral, 2, None, closed="left"), None],
-        **SETTINGS,
+        "n_frames": [Interval(Integral, 2, None, closed="left")],
         "reject_below": [Interval(Real, None, None, closed="neither"), StrOptions({"auto"}), None],
         "unknown_label": [str, Integral, Real, None],
+        "n_jobs": [Integral, None],
+        "verbose": ["verbose"],
     }
     _on_gaps = (
         "Put ASpace(1.0) before it, which expects what was hidden, or interpolate the gap, as by "
@@ -181,10 +175,6 @@ class ActionClassifier(
         summaries: bool = True,
         n_landmarks: int | None = 250,
         n_frames: int = 50,
-        velocity_smoothing: float = 0.06,
-        max_offset: float = 0.4,
-        smoothness: float = 0.003,
-        max_rate: float = 4,
         reject_below: float | Literal["auto"] | None = None,
         unknown_label: str | float | None = None,
         n_jobs: int | None = None,
@@ -196,10 +186,6 @@ class ActionClassifier(
         self.summaries = summaries
         self.n_landmarks = n_landmarks
         self.n_frames = n_frames
-        self.velocity_smoothing = velocity_smoothing
-        self.max_offset = max_offset
-        self.smoothness = smoothness
-        self.max_rate = max_rate
         self.reject_below = reject_below
         self.unknown_label = unknown_label
         self.n_jobs = n_jobs
@@ -276,27 +262,6 @@ class ActionClassifier(
             threshold = self.threshold_at(_COVERAGE)
         codes[decisions.max(axis=1) < threshold] = len(self.classes_)
         return add_unknown_label(self.classes_, self.unknown_label)[codes]
-
-    def score(
-        self, X: PerformancesLike, y: Labels, sample_weight: ValuesLike | None = None
-    ) -> float:
-        """Share of performances that are given their class.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-        y : array-like, shape (n_sequences,)
-            Their classes.
-        sample_weight : array-like, shape (n_sequences,), default=None
-            The weight of each performance; by default all are equal.
-
-        Returns
-        -------
-        float
-            From 0 to 1. One that ``reject_below`` rejects is a mistake.
-        """
-        return float(super().score(X, y, sample_weight))
 
     def predict_proba(self, X: PerformancesLike) -> np.ndarray:
         """The probability of each class, given that a performance is one of them.
@@ -439,13 +404,18 @@ class ActionClassifier(
                 f"costs must be some of {list(COSTS)}, each once, and at least one of them without "
                 f"summaries; got {self.costs!r}."
             )
-        names = "velocity_smoothing", "max_offset", "smoothness", "max_rate"
-        settings = {name: getattr(self, name) for name in names}
-        settings["n_frames"] = int(self.n_frames)
-        # A kernel needs no more than single precision: six digits of a distance.
-        settings["dtype"] = np.float32
-        # Postures keep the unit of the training set.
-        return [PairwiseDistance(c, normalize=c != "posture", **settings) for c in costs]
+        # Postures keep the unit of the training set. A kernel needs no more than single precision:
+        # six digits of a distance.
+        return [
+            PairwiseDistance(
+                cost,
+                normalize=cost != "posture",
+                n_frames=int(self.n_frames),
+                max_offset=_MAX_OFFSET,
+                dtype=np.float32,
+            )
+            for cost in costs
+        ]
 
     def _decisions(self, X):
         """Decision values of performances: (n_sequences, n_classes)."""

@@ -22,7 +22,7 @@ from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.matching.warps import normalise
-from sklearn_motionsync.model.similarity import log_moments
+from sklearn_motionsync.model.acceptance import log_moments
 from sklearn_motionsync.segmentation.search import (
     Proposer,
     WindowSearch,
