@@ -23,7 +23,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn_motionsync import Skeleton, gait_events
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.gait.feet import joints_of_feet
+from sklearn_motionsync.gait.recordings import joints_of_feet
 from sklearn_motionsync.io import read_motion
 
 PEOPLE = {"hdm05": ("jogLeftCircle4StepsRstart", 1.0), "cmu07_walk": ("walk", 0.01)}

@@ -15,7 +15,7 @@ from sklearn_motionsync import (
     to_sequences,
 )
 from sklearn_motionsync.io import cut_at_events
-from sklearn_motionsync.online.particle_filter import weighted_median
+from sklearn_motionsync.online.members import weighted_median
 
 SEEDS = range(2)
 

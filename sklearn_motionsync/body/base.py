@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import functools
 import warnings
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.features import check_input_features
 from ..inputs.numbers import column_names
-from ..inputs.types import PerformancesLike, Transformed
+from ..inputs.types import NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import (
     PerformanceTransformerMixin,
     check_performances,
@@ -21,6 +22,7 @@ from ..inputs.validation import (
 from ..inputs.wording import counted
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated
 from .axes import fill_heading, heading_axes, to_y_up
 from .formats import AXES, LANDMARKS, SIDES
 from .limbs import (
@@ -223,15 +225,55 @@ class PositionsTransformer(
 ):
     """Base of the transformers that compute features of joint positions, body by body.
 
-    A subclass has a ``skeleton``; ``hidden``, which is "raise" or "nan"; a ``fit`` that calls
-    ``_measure(X)``; a ``get_feature_names_out``; and a ``_features(portion, body)`` that returns
-    the features of a `Portion` of a `Body`.
+    A subclass has a ``skeleton``; ``hidden``, which is "raise" or "nan"; ``_names``, of its
+    features; and a ``_features(portion, body)`` that returns the features of a `Portion` of a
+    `Body`.
     """
 
     # What an error about NaN advises.
     _on_gaps = "Set hidden='nan', which takes hidden joints, interpolate the gap"
     # Lengths count in those of the body, so units do not matter.
     _facts = "frame_rate", "up"
+
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
+        """Check the performances, and learn the limb lengths.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
+            Joint positions, joint by joint x, y, z; or x, y.
+        y : ignored
+            Present for API consistency.
+
+        Returns
+        -------
+        self : object
+            The fitted transformer.
+
+        Raises
+        ------
+        ValueError
+            As from ``transform``, or if a limb is hidden throughout.
+        """
+        self.limb_lengths_ = self._measure(X)
+        return self
+
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
+        """Names of the features, such as ``hip_x`` or ``neck_x``: a limb or a joint, and an axis.
+
+        Parameters
+        ----------
+        input_features : array-like of str, default=None
+            Names of the columns before it, which are checked only.
+
+        Returns
+        -------
+        ndarray of str
+            One name a feature.
+        """
+        check_input_features(self, input_features)
+        return np.asarray(self._names, dtype=object)
 
     def transform(self, X: PerformancesLike) -> Transformed:
         """Features of joint positions.

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers
-from ..inputs.types import NamesLike, PerformancesLike, Transformed, ValuesLike
+from ..inputs.types import PerformancesLike, Transformed, ValuesLike
 from ..inputs.validation import check_transformed, restore
-from ..utils.parameters import validated
 from .axes import convert_to_parent_axes, project_on_axes
 from .base import PositionsTransformer, mask_hidden
 from .formats import AXES, LANDMARKS, SIDES
@@ -143,30 +141,6 @@ class DirectionCosines(PositionsTransformer):
         self.reference = reference
         self.hidden = hidden
 
-    @validated
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
-        """Learn the limb lengths.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
-            Joint positions, joint by joint x, y, z; or x, y.
-        y : ignored
-            Present for API consistency.
-
-        Returns
-        -------
-        DirectionCosines
-            The fitted transformer.
-
-        Raises
-        ------
-        ValueError
-            As from ``transform``, or if a limb is hidden throughout.
-        """
-        self.limb_lengths_ = self._measure(X)
-        return self
-
     def inverse_transform(
         self, X: PerformancesLike, limb_lengths: ValuesLike | None = None
     ) -> Transformed:
@@ -276,23 +250,11 @@ class DirectionCosines(PositionsTransformer):
         matrix = _forward_matrix(self._all_lengths(lengths), self.skeleton)
         return matrix, self.skeleton.body().column_names
 
-    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
-        """Names of the 37 parameters: ``pelvis_height``, ``hip_x``, ..., ``right_forearm_z``.
-
-        Parameters
-        ----------
-        input_features : array-like of str, default=None
-            Names of the columns before it, which are checked only.
-
-        Returns
-        -------
-        ndarray of str
-            One name a feature.
-        """
-        check_input_features(self, input_features)
+    @property
+    def _names(self):
         axes = AXES[self.skeleton.n_dims]
         names = [f"{limb}_{axis}" for limb in self.skeleton.limbs for axis in axes]
-        return np.asarray(["pelvis_height"] * self.skeleton.has_height + names, dtype=object)
+        return ["pelvis_height"] * self.skeleton.has_height + names
 
     def _features(self, portion, body):
         limbs, cosines = self.skeleton.limbs, portion.directions

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 from sklearn.utils._param_validation import StrOptions
 
-from ..inputs.features import check_input_features
-from ..inputs.types import NamesLike, PerformancesLike
-from ..utils.parameters import validated
 from .axes import project_on_axes
 from .base import PositionsTransformer
 from .formats import AXES, LANDMARKS, SIDES
@@ -113,47 +110,10 @@ class JointPositions(PositionsTransformer):
         self.reference = reference
         self.hidden = hidden
 
-    @validated
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
-        """Check the performances, and learn the limb lengths.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
-            Joint positions, joint by joint x, y, z; or x, y.
-        y : ignored
-            Present for API consistency.
-
-        Returns
-        -------
-        JointPositions
-            The fitted transformer.
-
-        Raises
-        ------
-        ValueError
-            As from ``transform``, or if a limb is hidden throughout.
-        """
-        self.limb_lengths_ = self._measure(X)
-        return self
-
-    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
-        """Names of the 42 coordinates: ``neck_x``, ``neck_y``, ..., ``right_ankle_z``.
-
-        Parameters
-        ----------
-        input_features : array-like of str, default=None
-            Names of the columns before it, which are checked only.
-
-        Returns
-        -------
-        ndarray of str
-            One name a feature.
-        """
-        check_input_features(self, input_features)
+    @property
+    def _names(self):
         axes = AXES[self.skeleton.n_dims]
-        names = [f"{landmark}_{axis}" for landmark in self._landmarks for axis in axes]
-        return np.asarray(names, dtype=object)
+        return [f"{landmark}_{axis}" for landmark in self._landmarks for axis in axes]
 
     @property
     def _landmarks(self):

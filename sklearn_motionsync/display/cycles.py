@@ -155,7 +155,7 @@ class CycleDisplay:
         recordings, takes = check_takes(segmenter, X, reset=True)
         i = as_index(take, len(takes), "take")
         (x,), (repeats,) = correlate_takes(segmenter, recordings[i : i + 1], takes[i : i + 1])
-        longest = (as_learnt(estimator, x, repeats) if fitted else repeats).found
+        longest = (as_learnt(estimator, x, repeats) if fitted else repeats).correlation
         row = segmenter.report(recordings[i : i + 1]).iloc[0]
         learnt = estimator if fitted else None
         name, curve = _curve_of(segmenter, learnt, recordings[i], x, feature)

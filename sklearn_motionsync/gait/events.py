@@ -12,17 +12,16 @@ from scipy.signal import find_peaks
 from ..body.skeleton import Skeleton
 from ..inputs.numbers import nanmean
 from ..inputs.types import PerformancesLike, ValuesLike
-from ..matching.counting import whole
-from .feet import Walk, horizontal, pieces
-from .recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
+from ..matching.counting import first_largest, parabola_vertex, whole
+from .recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings, Walk, horizontal, pieces
 
-__all__ = ["events_of", "gait_events", "tabulate_events"]
+__all__ = ["LEAST_STEP", "events_of", "gait_events", "tabulate_events"]
 
 # Standard deviations, in seconds, of the Gaussians for positions and for accelerations.
 _POSITION, _ACCELERATION = 0.03, 0.0175
 # A foot swings ahead by at least this share of the usual swing, and of the leg; strikes of a foot
 # are at least so many seconds apart.
-_LEAST_SWING, _LEAST_SHARE_OF_LEG, _LEAST_STRIDE = 0.4, 0.15, 0.35
+_LEAST_SWING, LEAST_STEP, _LEAST_STRIDE = 0.4, 0.15, 0.35
 # The feet come as far apart and together within so many seconds before and after.
 _SWING = 0.6
 # Standard deviation of a delay within a recording; around its mean it is looked for so far.
@@ -316,7 +315,7 @@ def _farthest(walk, side, points, sign):
     if not len(seen):
         return []
     low, high = np.percentile(seen, [3, 97])
-    least = max(_LEAST_SWING * (high - low), _LEAST_SHARE_OF_LEG)
+    least = max(_LEAST_SWING * (high - low), LEAST_STEP)
     distance, out = max(1, whole(_LEAST_STRIDE * walk.rate, "down")), []
     other_heels = [heel for other, heel in walk.heels.items() if other != side]
     apart = horizontal(points - (other_heels[0] if other_heels else walk.pelvis))
@@ -335,7 +334,7 @@ def _farthest(walk, side, points, sign):
             near = apart[max(0, piece.start + k - reach) : piece.start + k + reach]
             # Of a hidden foot it is not known.
             moved = np.linalg.norm(np.ptp(near, axis=0))
-            steps = np.isnan(moved) or moved >= _LEAST_SHARE_OF_LEG
+            steps = np.isnan(moved) or moved >= LEAST_STEP
             if steps and (is_first or not is_end):
                 out.append((piece.start + (k if is_end else _between(stretch, k)), is_end))
     return out
@@ -358,16 +357,14 @@ def _peak(values, curve=None):
     maxima = np.flatnonzero((inner >= curve[:-2]) & (inner > curve[2:])) + 1
     if not len(maxima):
         return None
-    return _between(curve, int(maxima[values[maxima].argmax()]))
+    return _between(curve, int(maxima[first_largest(values[maxima])]))
 
 
 def _between(values, k):
     """Where values have their maximum at sample k, by a parabola."""
     if not 0 < k < len(values) - 1:
         return float(k)
-    before, here, after = values[k - 1 : k + 2]
-    bend = before - 2 * here + after
-    return float(k + (before - after) / (2 * bend)) if bend < 0 else float(k)
+    return float(k + parabola_vertex(*values[k - 1 : k + 2])[0])
 
 
 def _is_seen(points, at):

@@ -12,8 +12,7 @@ from ..body.formats import SIDES
 from ..body.skeleton import Skeleton
 from ..inputs.types import PerformancesLike, Table, ValuesLike
 from .events import events_of
-from .feet import horizontal
-from .recordings import FOOT_OFF, FOOT_STRIKE, Recordings
+from .recordings import FOOT_OFF, FOOT_STRIKE, Recordings, horizontal
 
 __all__ = ["gait_parameters"]
 

@@ -1,17 +1,35 @@
-"""Recordings of walking: their joint positions, labels and frame rates, checked."""
+"""Recordings of walking: labels, frame rates, and the feet beside the pelvis."""
+
+import math
 
 import numpy as np
 import pandas as pd
+from scipy.interpolate import CubicSpline
 
+from ..body.axes import to_y_up
+from ..body.formats import SIDES
+from ..body.landmarks import as_tuple, guess_feet
 from ..body.skeleton import Skeleton, check_columns
 from ..inputs.collections import as_collection, check_members
+from ..inputs.numbers import nanmean
 from ..inputs.recorded import frame_rate_of_rows, frames_of_rows, start_of_rows
 from ..inputs.resampling import as_frame_rates
 from ..inputs.tables import as_pandas, index_of, labels_of
 from ..inputs.wording import counted, within
-from .feet import Walk, joints_of_feet
+from ..matching.counting import runs_of, whole
+from ..matching.filters import smooth
+from ..matching.gaps import interpolate_gaps
 
-__all__ = ["CONTEXTS", "FOOT_OFF", "FOOT_STRIKE", "Recordings"]
+__all__ = [
+    "CONTEXTS",
+    "FOOT_OFF",
+    "FOOT_STRIKE",
+    "Recordings",
+    "Walk",
+    "horizontal",
+    "joints_of_feet",
+    "pieces",
+]
 
 # Frames beyond an end that are rounding.
 _MARGIN = 0.5
@@ -175,3 +193,264 @@ class Recordings:
                     "second, not the time between frames."
                 )
         return rates
+
+
+# -- the feet of a recording, heels and toes beside the pelvis ----------------------------------
+
+_ENDS_OF_FEET = [f"{side}_{part}" for side in SIDES for part in ("heel", "toe")]
+# Positions are interpolated to at least so many samples a second.
+_LEAST_RATE = 240
+# Gaps up to this length, in seconds, are filled in. Pieces between gaps that are shorter than the
+# second number, or have fewer frames than the third, are left out.
+_LONGEST_GAP, _SHORTEST_PIECE, _FEWEST = 0.2, 0.25, 4
+# Standard deviations, in seconds, of the Gaussians for the direction of walking, and for the speed
+# of feet that swing.
+_HEADING, _SWING = 0.2, 0.03
+# Variance of third differences of white noise of variance 1; the share of them that is taken, those
+# of feet on the ground; and how large normal deviates are at most in such a share.
+_THIRD_DIFFERENCE, _SHARE, _DEVIATE = 20, 0.25, 0.3186
+
+
+def joints_of_feet(skeleton, feet=None):
+    """Indices of the joints at heels and toes; of those that are given, or guessed from the names.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    feet : mapping of str to str, tuple of str or None, default=None
+        The joints of some or all of `_ENDS_OF_FEET`; None leaves one out.
+
+    Returns
+    -------
+    dict of str to tuple of int
+        Without those that are not known.
+    """
+    given = {} if feet is None else dict(feet)
+    for name, joints in given.items():
+        if name not in _ENDS_OF_FEET:
+            raise ValueError(f"feet: {name!r} is none of {', '.join(_ENDS_OF_FEET)}.")
+        for joint in () if joints is None else as_tuple(joints):
+            if joint not in skeleton.joints:
+                raise ValueError(
+                    f"feet: {name!r} is at {joint!r}, which is no joint of the skeleton; it has "
+                    f"{list(skeleton.joints)[:40]}."
+                )
+    known = guess_feet(skeleton.joints, skeleton.landmarks) | given
+    return {
+        name: tuple(skeleton.joints.index(joint) for joint in as_tuple(joints))
+        for name, joints in known.items()
+        if joints is not None
+    }
+
+
+class Walk:
+    """A recording of a body that walks, at an even rate of at least 240 samples a second.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n_frames, n_dims * n_joints)
+        NaN where a joint is not seen.
+    skeleton : Skeleton
+    feet : dict of str to tuple of int
+        From `joints_of_feet`.
+    frame_rate : float
+    called : str
+        The name of the recording, with a capital letter.
+
+    Attributes
+    ----------
+    rate : float
+        Samples a second.
+    n_samples : int
+    per_frame : int
+        Samples a frame.
+    heels, toes : dict of str to ndarray (n_samples, n_dims)
+        By side, y up, in leg lengths; NaN in long gaps. The ankle stands for a missing heel. Feet
+        without toes have none.
+    has_heel : dict of str to bool
+    noise : dict of str to float
+        Standard deviation of the noise of the height of the heel in a frame.
+    pelvis : ndarray, shape (n_samples, n_dims)
+        A hip if there is no other.
+    forward : ndarray, shape (n_samples, n_dims - 1)
+        Horizontal unit vectors along which the body walks. Of a body that walks backwards they
+        point back, and heels and toes are exchanged: its toes strike first.
+    leg : float
+        Median height of the pelvis above the lower foot, the unit of the positions above.
+    """
+
+    def __init__(self, positions, skeleton, feet, frame_rate, called):
+        self._points = to_y_up(
+            positions.astype(np.float64).reshape(len(positions), -1, skeleton.n_dims), skeleton
+        )
+        self._fewest = max(_FEWEST, whole(_SHORTEST_PIECE * frame_rate, "up"))
+        if len(positions) < self._fewest:
+            raise ValueError(
+                f"{called} has {counted(len(positions), 'frame')} at {frame_rate:g} a second; "
+                f"{_SHORTEST_PIECE:g} s and {_FEWEST} frames are the least. Leave it out."
+            )
+        self.per_frame = max(1, whole(_LEAST_RATE / frame_rate, "up"))
+        self.rate, self._frame_rate = frame_rate * self.per_frame, frame_rate
+        self.n_samples = (len(positions) - 1) * self.per_frame + 1
+        self.heels, self.toes, self.has_heel, self.noise = {}, {}, {}, {}
+        for side in SIDES:
+            choices = [feet.get(f"{side}_heel"), self._landmark(skeleton, f"{side}_ankle")]
+            at = next((c for c in choices if c is not None and self._is_seen(c)), None)
+            if at is None:
+                continue
+            self.has_heel[side] = at == choices[0]
+            self.noise[side] = _noise(self._mean(at)[:, 1])
+            self.heels[side] = self._resample(at)
+            if f"{side}_toe" in feet and self._is_seen(feet[f"{side}_toe"]):
+                self.toes[side] = self._resample(feet[f"{side}_toe"])
+        if not self.heels:
+            raise ValueError(
+                f"{called}: no heel and no ankle is seen. Name them: "
+                "feet={'left_heel': 'LHEE', ...}."
+            )
+        self.pelvis = self._resample(_pelvis(skeleton, called))
+        lowest = np.min([heel[:, 1] for heel in self.heels.values()], axis=0)
+        heights = self.pelvis[:, 1] - lowest
+        heights = heights[~np.isnan(heights)]
+        self.leg = float(np.median(heights)) if len(heights) else 0.0
+        if not self.leg > 0:
+            raise ValueError(
+                f"{called}: the pelvis is never seen above the feet. Look at the vertical axis of "
+                f"the skeleton, {skeleton.up!r}, and at the landmarks."
+            )
+        for of_all in (self.heels, self.toes, self.noise):
+            for side in of_all:
+                of_all[side] = of_all[side] / self.leg
+        self.pelvis = self.pelvis / self.leg
+        self.forward = self._directions(skeleton)
+        self.forward *= self._sense_of_swings()
+        along = [
+            np.einsum("ij,ij->i", horizontal(toe - self.heels[side]), self.forward)
+            for side, toe in self.toes.items()
+        ]
+        if along and np.nanmean(np.concatenate(along)) < 0:
+            for side in self.toes:
+                self.heels[side], self.toes[side] = self.toes[side], self.heels[side]
+
+    def ahead(self, points):
+        """How far points (n_samples, n_dims) are ahead of the pelvis."""
+        return np.einsum("ij,ij->i", horizontal(points - self.pelvis), self.forward)
+
+    def filtered(self, values, width, order=0):
+        """Values (n_samples,) or (n_samples, n) under a Gaussian, or their derivative by time.
+
+        ``width`` is its standard deviation in seconds. NaN stays NaN.
+        """
+        flat = values.reshape(len(values), -1)
+        out = np.full_like(flat, np.nan)
+        for piece in pieces(flat):
+            if piece.stop - piece.start > 2:
+                part = np.ascontiguousarray(flat[piece])[np.newaxis]
+                out[piece] = smooth(part, width * self.rate, order)[0] * self.rate**order
+        return out.reshape(values.shape)
+
+    def _landmark(self, skeleton, name):
+        return skeleton.indices_of(name) if name in skeleton.landmarks else None
+
+    def _is_seen(self, joints):
+        return not np.isnan(self._mean(joints)).any(axis=1).all()
+
+    def _mean(self, joints):
+        """The mean of some joints: (n_frames, n_dims), NaN where none of them is seen.
+
+        A joint that is hidden while another is seen keeps its way from that one, on a straight line
+        across the gap. One that is never seen is left out.
+        """
+        points = self._points[:, list(joints)]
+        hidden = np.isnan(points).any(axis=2)
+        points, hidden = points[:, ~hidden.all(axis=0)], hidden[:, ~hidden.all(axis=0)]
+        if not hidden.any() or points.shape[1] < 2:
+            return nanmean(points, axis=1)
+        filled = points.copy()
+        for j in np.flatnonzero(hidden.any(axis=0)):
+            ways = (points[:, j, np.newaxis] - points).reshape(len(points), -1)
+            ways = interpolate_gaps(ways, held=True, straight=True).reshape(points.shape)
+            rows = hidden[:, j]
+            filled[rows, j] = nanmean((points + ways)[rows].swapaxes(0, 1), axis=0)
+        return filled.mean(axis=1)
+
+    def _resample(self, joints):
+        """Positions of the mean of some joints at the samples."""
+        longest = whole(_LONGEST_GAP * self._frame_rate, "down")
+        x = interpolate_gaps(self._mean(joints), longest)
+        frames = np.arange(len(x))
+        out = np.full((self.n_samples, x.shape[1]), np.nan)
+        for piece in pieces(x):
+            if piece.stop - piece.start < self._fewest:
+                continue
+            samples = np.arange(piece.start * self.per_frame, (piece.stop - 1) * self.per_frame + 1)
+            spline = CubicSpline(frames[piece], x[piece])
+            out[samples] = spline(samples / self.per_frame)
+        return out
+
+    def _directions(self, skeleton):
+        """Horizontal unit vectors along the way, in either sense.
+
+        Across hips or shoulders, else along the feet, else along the line on which they come apart.
+        """
+        if skeleton.n_dims == 2:
+            return np.ones((self.n_samples, 1))
+        for part in ("hip", "shoulder"):
+            pair = [self._landmark(skeleton, f"{side}_{part}") for side in SIDES]
+            if None not in pair and all(map(self._is_seen, pair)):
+                left, right = map(self._resample, pair)
+                across = horizontal(left - right)
+                return self._unit(np.stack([-across[:, 1], across[:, 0]], axis=1))
+        if self.toes:
+            along = [self.toes[side] - self.heels[side] for side in self.toes]
+            return self._unit(nanmean([horizontal(x) for x in along], axis=0))
+        apart = np.concatenate([horizontal(heel - self.pelvis) for heel in self.heels.values()])
+        apart = apart[~np.isnan(apart).any(axis=1)]
+        _, _, axes = np.linalg.svd(apart - apart.mean(axis=0), full_matrices=False)
+        return np.tile(axes[0], (self.n_samples, 1))
+
+    def _sense_of_swings(self):
+        """1 if feet swing along `forward`, in which they are higher than on the ground; else -1."""
+        total = 0.0
+        for heel in self.heels.values():
+            velocity = self.filtered(self.ahead(heel), _SWING, 1)
+            height = heel[:, 1] - self.pelvis[:, 1]
+            known = ~np.isnan(velocity) & ~np.isnan(height)
+            total += float(((height - height[known].mean()) * velocity)[known].sum())
+        return 1.0 if total >= 0 else -1.0
+
+    def _unit(self, directions):
+        filled = interpolate_gaps(directions, held=True, straight=True)
+        filled = smooth(filled[np.newaxis], _HEADING * self.rate)[0]
+        size = np.linalg.norm(filled, axis=1, keepdims=True)
+        return filled / np.where(size > 0, size, 1)
+
+
+def _pelvis(skeleton, called):
+    """The joints whose mean is the pelvis, or the hips that there are."""
+    known = [name for name in ("pelvis", "left_hip", "right_hip") if name in skeleton.landmarks]
+    if not known:
+        raise ValueError(
+            f"{called}: the skeleton has no pelvis and no hip. Name one: "
+            "Skeleton(..., landmarks={'pelvis': ..., ...})."
+        )
+    return skeleton.indices_of(known[0])
+
+
+def pieces(x):
+    """Slices of rows (n, n_columns) without NaN."""
+    return [slice(first, end) for first, end in runs_of(~np.isnan(x).any(axis=1)).tolist()]
+
+
+def horizontal(points):
+    """The components (n, n_dims - 1) of points, y up, that are not vertical."""
+    return points[:, [0, 2]] if points.shape[1] == 3 else points[:, [0]]
+
+
+def _noise(heights):
+    """Standard deviation of white noise, from the smallest third differences."""
+    third = np.abs(np.diff(heights, 3))
+    third = third[~np.isnan(third)]
+    if not len(third):
+        return 0.0
+    return float(np.quantile(third, _SHARE)) / _DEVIATE / math.sqrt(_THIRD_DIFFERENCE)

@@ -7,7 +7,7 @@ So what is counted or chosen is decided here, with a tolerance.
 
 import numpy as np
 
-__all__ = ["ROUNDING", "first_largest", "first_smallest", "runs_of", "whole"]
+__all__ = ["ROUNDING", "first_largest", "first_smallest", "parabola_vertex", "runs_of", "whole"]
 
 # Values that differ by a smaller share are equal.
 ROUNDING = 1e-9
@@ -66,6 +66,24 @@ def first_smallest(values, rounding=None, axis=None):
 def first_largest(values, rounding=None, axis=None):
     """The first index whose value is within rounding of the largest, as `first_smallest`."""
     return first_smallest(np.negative(values), rounding, axis)
+
+
+def parabola_vertex(before, here, after):
+    """Where a parabola through a maximum and its neighbours has its vertex, and how high it is.
+
+    Parameters
+    ----------
+    before, here, after : float or ndarray
+        Values of a curve at three neighbouring samples, of which the middle one is a maximum.
+
+    Returns
+    -------
+    offset, height : float or ndarray
+        Samples from the middle one to the vertex, 0 where the three values lie on a straight line.
+    """
+    bend = before - 2 * here + after
+    offset = np.where(bend < 0, (before - after) / np.where(bend < 0, 2 * bend, 1), 0.0)[()]
+    return offset, here - bend * offset**2 / 2
 
 
 def runs_of(mask):

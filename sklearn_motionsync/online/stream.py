@@ -2,7 +2,7 @@
 
 import warnings
 from collections import deque
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,7 @@ import pandas as pd
 from ..inputs.numbers import LARGEST, SMALLEST, as_numbers, check_finite, check_names
 from .causal import CausalDerivative
 
-__all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times", "time_left"]
+__all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times"]
 
 # Shares of the clock: the window of rate and cost, and how near a phase counts as right.
 _WINDOW, _TOLERANCE = 0.1, 0.05
@@ -36,20 +36,11 @@ _PERIODS = 1 / 3, 3
 _FORGETTING = 3
 
 
-class _Estimate(NamedTuple):
-    # Numbers of a frame, arrays of several.
-    phase: Any
-    rate: Any
-    confidence: Any
-    lower: Any = None
-    upper: Any = None
-
-
-class LivePhase(_Estimate):
+class LivePhase(NamedTuple):
     """The phase of a running performance, its rate, and how sure it is.
 
     All values have the shape of the phase: numbers of a frame, arrays of several frames or
-    performances. It is a tuple of the first five; ``cycle`` is an attribute.
+    performances.
 
     Parameters
     ----------
@@ -79,23 +70,12 @@ class LivePhase(_Estimate):
     (12.5, 6.0)
     """
 
+    phase: Any
+    rate: Any
+    confidence: Any
+    lower: Any = None
+    upper: Any = None
     cycle: Any = None
-
-    def __new__(
-        cls,
-        phase: Any,
-        rate: Any,
-        confidence: Any,
-        lower: Any = None,
-        upper: Any = None,
-        cycle: Any = None,
-    ) -> Self:
-        phases = super().__new__(cls, phase, rate, confidence, lower, upper)
-        phases.cycle = cycle
-        return phases
-
-    def __repr__(self):
-        return f"{super().__repr__()[:-1]}, cycle={self.cycle!r})"
 
 
 class Session:
@@ -201,11 +181,17 @@ class Course:
         self._cycle = cycle
 
     def time_left(self):
-        """The time until each stream ends, or its cycle; (n_streams,)."""
+        """The time until each stream ends, or its cycle; (n_streams,).
+
+        A mean of what is left of the mean duration, and of the phase at the mean pace, which has
+        the share of the clock that has passed as its weight.
+        """
+        share, duration = self._share, self._duration
         if self._cyclic:
-            return (1 - self._share) * self._period
+            return (1 - share) * self._period
         elapsed = np.where(np.isnan(self._begin), 0, self._time - self._begin)
-        return time_left(self._share, elapsed, self._duration)
+        by_time = np.maximum(duration - elapsed, 0)
+        return (1 - share) * by_time + share * duration * (1 - share)
 
 
 class Streams:
@@ -458,18 +444,16 @@ def go_round(before, now, cycles, last, tolerance):
     return np.where(stays, 0, now), np.where(stays, 0, turns)
 
 
-def each_value(found, function):
+def each_value(phases, function):
     """The `LivePhase` of a function of every value."""
-    return LivePhase(*map(function, found), cycle=function(found.cycle))
+    return LivePhase(*map(function, phases))
 
 
 def stack_phases(phases):
     """The `LivePhase` of each frame as one of arrays."""
     if not phases:
         return LivePhase(*np.empty((5, 0)), cycle=np.empty(0, dtype=np.intp))
-    phase, rate, confidence, lower, upper = map(np.array, zip(*phases, strict=True))
-    cycle = np.array([each.cycle for each in phases])
-    return LivePhase(phase, rate, confidence, lower, upper, cycle)
+    return LivePhase(*map(np.array, zip(*phases, strict=True)))
 
 
 def gains_of(costs):
@@ -529,25 +513,6 @@ def _bounds_of(weights, first, phase, last):
     bounds = first + (mass >= (mass[:, -1] * _TAILS)[..., np.newaxis]).argmax(axis=-1)
     least = max(1.0, _LEAST * last)
     return np.array([np.minimum(bounds[0], phase - least), np.maximum(bounds[1], phase + least)])
-
-
-def time_left(share, elapsed, duration):
-    """Estimate the time until the end of a performance.
-
-    A mean of what is left of the mean duration, and of the phase at the mean pace, which has the
-    weight ``share``.
-
-    Parameters
-    ----------
-    share : ndarray
-        The phase, from 0 to 1.
-    elapsed : ndarray
-        Time since the beginning.
-    duration : float
-        Mean duration, in the same unit.
-    """
-    by_time = np.maximum(duration - elapsed, 0)
-    return (1 - share) * by_time + share * duration * (1 - share)
 
 
 def check_observations(x, what, names, width, ndims=(1,)) -> np.ndarray:

@@ -17,14 +17,14 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.formats import SIDES
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
-from ..gait.events import events_of
+from ..gait.events import LEAST_STEP, events_of
 from ..gait.recordings import FOOT_STRIKE, Recordings
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.types import PerformancesLike, ValuesLike
 from ..inputs.validation import check_performances, names_of_input, warn_of_clocks
-from ..matching.counting import first_largest, whole
+from ..matching.counting import ROUNDING, first_largest, whole
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
@@ -88,7 +88,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     2. The template of one cycle is the mean of the cycles of all stretches at constant period.
     3. Dense matching aligns every stretch with the template, repeated periodically: a path may
        begin and end at any phase. The template is averaged again, twice.
-    4. The template begins where a foot is farthest ahead, or where a feature is largest.
+    4. The template begins where a foot is farthest ahead, in gait, or where a feature is largest.
     5. Stretches are cut where their phase is a whole number.
 
     What is in no stretch is left out. So are the pieces of a stretch before the first cut and after
@@ -111,8 +111,9 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         foot strikes, by `gait_events`, which needs the frame rate. Or a compared feature, by name
         or index: where it is largest. In pictures, where y runs down, the y of a hip is largest
         where the hip is lowest; change its sign to cut where the hip is highest. None is
-        ``"ahead"`` if the skeleton has feet in space, otherwise the feature that repeats best: see
-        ``start_``.
+        ``"ahead"`` for gait: the skeleton has feet in space, and in the mean cycle their places
+        ahead of the pelvis, left less right, change by at least 0.15 leg lengths. For other
+        movements it is the feature that repeats best: see ``start_``.
     threshold : float, default=0.4
         The self-correlation from which a stretch is cyclic, from 0 to 1. The limit is higher where
         chance correlations are larger: for movements in few directions (``breadth`` of
@@ -270,7 +271,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             periods = np.full(len(takes), np.nan)
             for i in cyclic:
                 summary = summary_of([stretch for k, stretch in stretches if k == i])
-                periods[i] = summary.found.period
+                periods[i] = summary.correlation.period
         self.start_, self.template_, self.periods_ = name, template, periods
         return self
 
@@ -321,7 +322,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             cycles_of_stretch = [(i, number, *row) for row in cycles]
             rows += cycles_of_stretch
             # Where several cycles fit there was a warning of that.
-            correlation = stretch.found
+            correlation = stretch.correlation
             periods += [correlation.period if len(correlation.periods) == 1 else np.nan] * len(
                 cycles_of_stretch
             )
@@ -384,11 +385,11 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         index = pd.Index(takes.labels, tupleize_cols=False, name="take")
         return pd.DataFrame(rows, columns=columns, index=index)
 
-    def _select_cyclic(self, takes, found):
+    def _select_cyclic(self, takes, repeats):
         """Indices of the takes that are cyclic; an error if others are not to be skipped."""
-        cyclic = [i for i, (_, _, reason) in enumerate(found) if not reason]
+        cyclic = [i for i, (_, _, reason) in enumerate(repeats) if not reason]
         if len(cyclic) < len(takes) and self.not_cyclic == "raise":
-            i, (_, best, reason) = next((i, f) for i, f in enumerate(found) if f.reason)
+            i, (_, best, reason) = next((i, r) for i, r in enumerate(repeats) if r.reason)
             within = "" if self.period is None else f" within period={self.period}"
             raise ValueError(
                 f"{takes.called(i)}: {reason}{within}. Its self-correlation is "
@@ -397,10 +398,10 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 'Leave it out, give a longer take, or set not_cyclic="skip"; see report(X).'
             )
         several = {
-            i: stretch.found
+            i: stretch.correlation
             for i in reversed(cyclic)
-            for stretch in found[i].stretches
-            if len(stretch.found.periods) > 1
+            for stretch in repeats[i].stretches
+            if len(stretch.correlation.periods) > 1
         }
         if several:
             i, first = min(several.items(), key=lambda item: item[0])
@@ -453,14 +454,6 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
 
     def _find_start(self, curves, sampled, takes_of, phases):
         """The name of what begins a cycle, and its phase in the template."""
-        if curves is None:
-            width = sampled[0].values.shape[1] // 2
-            values = [take.values[:, :width] for take in sampled]
-            mean = average_cycle(values, phases)
-            repeats = np.square(mean).mean(axis=0)
-            moves = np.square(np.concatenate(values)).mean(axis=0)
-            best = first_largest(repeats / np.where(moves > 0, moves, np.inf))
-            return compared_names(self)[best], circular_peak(mean[:, best]) / PHASES
         cycles = {
             name: average_cycle(
                 [
@@ -469,8 +462,18 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 ],
                 phases,
             )[:, 0]
-            for name, of_all in curves.items()
+            for name, of_all in (curves or {}).items()
         }
+        if not cycles or (self.start is None and not _is_gait(cycles)):
+            width = sampled[0].values.shape[1] // 2
+            values = [take.values[:, :width] for take in sampled]
+            mean = average_cycle(values, phases)
+            repeats = np.square(mean).mean(axis=0)
+            moves = np.square(np.concatenate(values)).mean(axis=0)
+            # What moves less is rounding.
+            moves = np.where(moves > ROUNDING * moves.max(), moves, np.inf)
+            best = first_largest(repeats / moves)
+            return compared_names(self)[best], circular_peak(mean[:, best]) / PHASES
         name = list(cycles)[first_largest([cycle.max() for cycle in cycles.values()])]
         return name, circular_peak(cycles[name]) / PHASES
 
@@ -507,14 +510,14 @@ def correlate_takes(segmenter, collection, takes, step=None):
     return features, repeats
 
 
-def as_learnt(segmenter, features, found):
+def as_learnt(segmenter, features, repeats):
     """What repeats in a take, at the only cycle that is as long as those of the fit.
 
-    A stretch stays as found if one cycle fits, or none or several are as long.
+    A stretch stays as it is if one cycle fits, or none or several are as long.
     """
     learnt, stretches = segmenter.periods_, []
-    for stretch in found.stretches:
-        fits = stretch.found.periods
+    for stretch in repeats.stretches:
+        fits = stretch.correlation.periods
         near = (fits >= np.nanmin(learnt) / _AS_LONG) & (fits <= np.nanmax(learnt) * _AS_LONG)
         if len(fits) > 1 and near.sum() == 1:
             (period,) = fits[near]
@@ -524,12 +527,12 @@ def as_learnt(segmenter, features, found):
                 stretches.append(Stretch(stretch.start, stretch.stop, chosen))
                 continue
         stretches.append(stretch)
-    return summary_of(stretches) if stretches else found
+    return summary_of(stretches) if stretches else repeats
 
 
 def sampled_stretch(features, stretch):
     """A stretch of a take with features, ready to be matched."""
-    return SampledStretch(features, stretch.found.period, stretch.start, stretch.stop)
+    return SampledStretch(features, stretch.correlation.period, stretch.start, stretch.stop)
 
 
 def _check_period(period):
@@ -623,6 +626,11 @@ def _has_feet(skeleton):
         return False
     shows_heading = bool({"hip", "shoulder"} & set(skeleton.limbs))
     return shows_heading and {"pelvis", "left_ankle", "right_ankle"} <= set(skeleton.landmarks)
+
+
+def _is_gait(cycles):
+    """Whether the feet step in a mean cycle, by their places ahead of the pelvis."""
+    return np.ptp(cycles[SIDES[0]] - cycles[SIDES[1]]) >= LEAST_STEP
 
 
 def _warn_of_lengths(takes, table, periods):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 import warnings
 from bisect import bisect, insort
 from numbers import Integral, Real
@@ -83,7 +82,6 @@ def find_performances(
     threshold: float | Literal["auto"] | None = "auto",
     coverage: float = 0.8,
     max_hits: int | None = None,
-    durations: tuple[int, int] | None = None,
     groups: Labels | None = None,
     frame_rate: float | ValuesLike | None = None,
     pattern_rate: float | None = None,
@@ -96,7 +94,8 @@ def find_performances(
     2. Each window is compared with the training performances after linear normalisation: by its
        dissimilarity to the two nearest ones in posture and in the synchronizer's features, and by
        its length and energy. The score is ``exp(-dissimilarity)``: 1 is equal, 0.37 as
-       dissimilar as standing still.
+       dissimilar as standing still. Windows have from 10 % fewer to 10 % more frames than the
+       training performances; those of a single pattern from 2/3 to 3/2 of its length.
     3. The ends of the best window are moved to where its score is best; then those of the best
        window that does not overlap it, and so on. Windows that reach the threshold are hits.
 
@@ -127,10 +126,6 @@ def find_performances(
         unless random movements score as high; less where many windows of a take do.
     max_hits : int, default=None
         How many hits are kept of each take, the best ones; by default all.
-    durations : (int, int), default=None
-        Smallest and largest number of frames of a hit in its take. By default 10 % beyond the
-        training performances, and an unusual length lowers the score; for an array from 2/3 to 3/2
-        of its length.
     groups : array-like, default=None
         Group of each training performance, such as its subject. By default the groups that an
         `ActionModel` in the pipeline was fitted with; it keeps those of at most 64 performances.
@@ -168,13 +163,6 @@ def find_performances(
     ActionDetector : Whether a performance that is cut out already is the action.
     sklearn_motionsync.display.SearchDisplay : Draws hits along the takes.
 
-    Notes
-    -----
-    The threshold of ``"auto"`` depends on how subjects differ, and on how many windows of a take
-    resemble the action. Raise ``coverage`` to miss less, or the threshold for fewer false hits;
-    docs/design.md has figures. Actions that subjects perform in entirely
-    different ways are found rarely.
-
     Examples
     --------
     >>> import numpy as np
@@ -192,44 +180,51 @@ def find_performances(
     checker = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
     checked = check_performances(checker, X, reset=True, level="sequence", facts=())
     searched, paces, is_rate_known = _at_rate_of(pattern, X, checked, frame_rate, pattern_rate)
-    groups_given = groups
-    synchronizer, takes, groups = _reach(pattern, searched, groups)
-    sources = checked if searched is X else searched
-    for i, (before, after) in enumerate(zip(sources, takes, strict=True)):
-        if len(before) != len(after):
+    synchronizer, takes, codes = _reach(pattern, searched, groups)
+    _check_lengths(checked if searched is X else searched, takes, checked.called)
+    dissimilarity = WindowDissimilarity(synchronizer, codes)
+    propose = Proposer.of(synchronizer, *_limits_of_windows(synchronizer.lengths_))
+    with Progress(checker, verbose) as progress:
+        hits = _search_takes(takes, propose, dissimilarity, threshold, coverage, progress)
+    rows = []
+    for i, (hits_of_take, level) in enumerate(hits):
+        best = best_hits(hits_of_take, 0.0 if threshold is None else level, max_hits)
+        rows += [(i, *hit, level) for hit in in_frames_given(best, paces[i], len(checked[i]))]
+    types = {"take": int, "start": int, "stop": int, "score": float, "threshold": float}
+    table = pd.DataFrame(rows, columns=list(types)).astype(types)
+    if threshold is not None and table.empty and not is_rate_known:
+        _warn_of_other_rates(pattern, X, threshold, coverage, groups)
+    return cut_takes(X, checked, table)
+
+
+def _check_lengths(before, after, called):
+    """Refuse takes whose number of frames is changed before they reach the synchronizer."""
+    for i, (take, reached) in enumerate(zip(before, after, strict=True)):
+        if len(take) != len(reached):
             raise ValueError(
-                f"{checked.called(i)} has {len(before)} frames, and {len(after)} after the steps "
-                "before the synchronizer, so frames of hits are unknown. Resample the takes first."
+                f"{called(i)} has {len(take)} frames, and {len(reached)} after the steps before "
+                "the synchronizer, so frames of hits are unknown. Resample the takes first."
             )
-    dissimilarity = WindowDissimilarity(synchronizer, groups, length=durations is None)
+
+
+def _search_takes(takes, propose, dissimilarity, threshold, coverage, progress):
+    """The hits of every take, and the threshold that holds for it."""
     fixed = None if threshold is None or threshold == "auto" else max(threshold, _NO_SCORE)
     limit = dissimilarity.threshold(coverage) if fixed is None else -np.log(fixed)
     hopeless = float(np.exp(-_HOPELESS * limit))
-    proposers = {
-        pace: Proposer.of(synchronizer, *_check_durations(synchronizer, durations, pace))
-        for pace in set(paces)
-    }
-    sizes = [proposers[pace].n_portions(len(x)) for pace, x in zip(paces, takes, strict=True)]
-    hits_of_all = []
-    with Progress(checker, verbose) as progress:
-        step = progress.stage("searching", 2 * sum(sizes))
-        for i, (take, pace, size) in enumerate(zip(takes, paces, sizes, strict=True)):
-            take, propose = take.astype(np.float64, copy=False), proposers[pace]
-            search = WindowSearch(take, dissimilarity, propose.shortest, propose.longest)
-            lowest = 0.0 if threshold is None else hopeless
-            hits = search.hits(propose(take, step), lowest, step, size)
-            level = threshold
-            if fixed is None:
-                u = -np.log([hit.score for hit in hits if hit.proposed >= hopeless])
-                level = float(np.exp(-dissimilarity.threshold_of_take(limit, u, len(take))))
-            best = best_hits(hits, 0.0 if threshold is None else level, max_hits)
-            in_own_frames = in_frames_given(best, pace, len(checked[i]), durations)
-            hits_of_all += [(i, *hit, level) for hit in in_own_frames]
-    types = {"take": int, "start": int, "stop": int, "score": float, "threshold": float}
-    rows = pd.DataFrame(hits_of_all, columns=list(types)).astype(types)
-    if threshold is not None and rows.empty and not is_rate_known:
-        _warn_of_other_rates(pattern, X, threshold, coverage, durations, groups_given)
-    return cut_takes(X, checked, rows)
+    sizes, out = [propose.n_portions(len(take)) for take in takes], []
+    step = progress.stage("searching", 2 * sum(sizes))
+    for take, size in zip(takes, sizes, strict=True):
+        take = take.astype(np.float64, copy=False)
+        search = WindowSearch(take, dissimilarity, propose.shortest, propose.longest)
+        lowest = 0.0 if threshold is None else hopeless
+        hits = search.hits(propose(take, step), lowest, step, size)
+        level = threshold
+        if fixed is None:
+            u = -np.log([hit.score for hit in hits if hit.proposed >= hopeless])
+            level = float(np.exp(-dissimilarity.threshold_of_take(limit, u, len(take))))
+        out.append((hits, level))
+    return out
 
 
 def _at_rate_of(pattern, X, given, frame_rate, pattern_rate):
@@ -286,7 +281,7 @@ def _at_rate_of(pattern, X, given, frame_rate, pattern_rate):
     return searched, paces, is_known
 
 
-def _warn_of_other_rates(pattern, X, threshold, coverage, durations, groups):
+def _warn_of_other_rates(pattern, X, threshold, coverage, groups):
     """Warn if takes without hits would have some at another frame rate."""
     counts = {}
     for times in _OTHER_RATES:
@@ -295,7 +290,6 @@ def _warn_of_other_rates(pattern, X, threshold, coverage, durations, groups):
             X,
             threshold=threshold,
             coverage=coverage,
-            durations=durations,
             groups=groups,
             frame_rate=times,
             pattern_rate=1.0,
@@ -335,7 +329,7 @@ def _resample(x, array, pace, rate):
     return out
 
 
-def in_frames_given(hits, pace, n_frames, durations=None):
+def in_frames_given(hits, pace, n_frames):
     """Hits in a resampled take, in order of time, in the frames of the take as it was given.
 
     Parameters
@@ -346,17 +340,14 @@ def in_frames_given(hits, pace, n_frames, durations=None):
         The frames that were given in a frame that was searched.
     n_frames : int
         Of the take that was given.
-    durations : (int, int), default=None
-        Limits of the numbers of frames.
     """
     if pace == 1 or not hits:
         return hits
-    shortest, longest = durations or (1, n_frames)
     starts = [whole(start * pace) for start, _, _ in hits]
     sizes = [whole((stop - 1 - start) * pace) + 1 for start, stop, _ in hits]
     # Hits that touch may share a frame of a take of a lower rate.
     return [
-        (start, min(start + min(max(size, shortest), longest), limit), score)
+        (start, min(start + size, limit), score)
         for start, size, limit, (_, _, score) in zip(
             starts, sizes, [*starts[1:], n_frames], hits, strict=True
         )
@@ -513,24 +504,11 @@ def _training_groups(pattern, reached, groups):
     return None
 
 
-def _check_durations(synchronizer, durations, pace):
-    """The smallest and the largest number of frames of a window of takes at a pace."""
-    if durations is None:
-        lengths = synchronizer.lengths_
-        margin = _MARGIN if len(lengths) > 1 else _MARGIN_OF_ONE
-        shortest = max(_SHORTEST, whole(lengths.min() / margin, "down"))
-        return shortest, whole(lengths.max() * margin, "up")
-    pair = tuple(durations) if isinstance(durations, (tuple, list, np.ndarray)) else ()
-    is_pair = len(pair) == 2 and all(isinstance(n, Integral) for n in pair)
-    if not (is_pair and 2 <= pair[0] <= pair[1]):
-        raise ValueError(
-            "durations must be two whole numbers of frames, the smallest, at least 2, and the "
-            f"largest; got {reprlib.repr(durations)}."
-        )
-    # Both ends are frames of the window.
-    shortest, longest = ((n - 1) / pace + 1 for n in pair)
-    shortest = max(2, whole(shortest, "up"))
-    return shortest, max(shortest, whole(longest, "down"))
+def _limits_of_windows(lengths):
+    """The smallest and the largest number of frames of a window, by the training performances."""
+    margin = _MARGIN if len(lengths) > 1 else _MARGIN_OF_ONE
+    shortest = max(_SHORTEST, whole(lengths.min() / margin, "down"))
+    return shortest, whole(lengths.max() * margin, "up")
 
 
 # -- proposals: windows of a take that may hold the action, by matching with free ends ------

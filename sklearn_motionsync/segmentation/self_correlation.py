@@ -14,7 +14,7 @@ from ..inputs.collections import as_collection, check_members
 from ..inputs.tables import as_pandas
 from ..inputs.types import PerformanceLike
 from ..inputs.wording import counted
-from ..matching.counting import whole
+from ..matching.counting import parabola_vertex, whole
 from ..matching.filters import smooth
 
 __all__ = [
@@ -28,7 +28,6 @@ __all__ = [
     "required_strength",
     "self_correlation",
     "smoothing_width",
-    "with_period",
 ]
 
 # Cycles that a take must hold at least to show that it repeats.
@@ -146,8 +145,8 @@ def self_correlation(take: PerformanceLike, skeleton: Skeleton | None = None) ->
     >>> from sklearn_motionsync import self_correlation
     >>> t = np.arange(200)
     >>> take = np.column_stack([np.sin(2 * np.pi * t / 63), np.cos(2 * np.pi * t / 63)])
-    >>> found = self_correlation(take)
-    >>> round(found.period, 1), round(found.strength, 2), round(found.n_cycles, 1)
+    >>> result = self_correlation(take)
+    >>> round(result.period, 1), round(result.strength, 2), round(result.n_cycles, 1)
     (63.0, 1.0, 3.2)
     >>> self_correlation(take[:70]).period
     nan
@@ -181,7 +180,8 @@ def correlate(x, limits=None):
     )
     breadth, correlation = breadth_of(smoothed[0]), (posture + velocity) / 2
     peaks = _find_peaks(correlation, posture)
-    lags, values = _vertices(correlation, peaks)
+    offsets, values = parabola_vertex(*(correlation[peaks + k] for k in (-1, 0, 1)))
+    lags = peaks + offsets
     if limits is not None:
         inside = (limits[0] <= lags) & (lags <= limits[1])
         lags, values = lags[inside], values[inside]
@@ -199,11 +199,6 @@ def correlate(x, limits=None):
     return SelfCorrelation(
         correlation, posture, velocity, peaks, period, strength, n_cycles, breadth, periods
     )
-
-
-def with_period(found, period, n_cycles):
-    """A self-correlation with another period and number of cycles."""
-    return SelfCorrelation(*found[:4], period, found.strength, n_cycles, *found[7:])
 
 
 def _are_shown(n_frames, lags, strong):
@@ -245,12 +240,12 @@ def required_strength(n_cycles, breadth, threshold):
     return required / np.sqrt(overlap)
 
 
-def rejection_reason(found, threshold):
+def rejection_reason(correlation, threshold):
     """Why a take cannot be segmented; empty, if it can."""
-    required = required_strength(found.n_cycles, found.breadth, threshold)
-    if not found.n_cycles or found.strength < required:
+    required = required_strength(correlation.n_cycles, correlation.breadth, threshold)
+    if not correlation.n_cycles or correlation.strength < required:
         return "not cyclic"
-    hundredths = whole(100 * found.n_cycles, "down")
+    hundredths = whole(100 * correlation.n_cycles, "down")
     return "" if hundredths >= 100 * LEAST_CYCLES else f"holds {hundredths / 100:.2f} cycles"
 
 
@@ -319,11 +314,3 @@ def _find_peaks(correlation, posture):
     peaks = np.flatnonzero((inner > before) & (inner >= after) & (inner > 0)) + 1
     lowest = np.minimum.accumulate(posture)
     return peaks[lowest[peaks] < _FALL * correlation[peaks]]
-
-
-def _vertices(correlation, peaks):
-    """Maxima of parabolas through peaks and their neighbours: lags and values."""
-    before, here, after = (correlation[peaks + k] for k in (-1, 0, 1))
-    bend = before - 2 * here + after
-    offsets = (before - after) / (2 * bend)
-    return peaks + offsets, here - bend * offsets**2 / 2

@@ -8,7 +8,7 @@ from scipy.fft import irfft, rfft
 from scipy.ndimage import uniform_filter1d
 
 from ..matching.costs import StepTable, step_table
-from ..matching.counting import first_largest, whole
+from ..matching.counting import first_largest, first_smallest, parabola_vertex, whole
 from ..matching.filters import smooth
 from ..matching.trellis import Trellis
 from ..matching.warps import normalise
@@ -22,7 +22,6 @@ from .self_correlation import (
     rejection_reason,
     required_strength,
     smoothing_width,
-    with_period,
 )
 
 __all__ = [
@@ -72,18 +71,18 @@ class Stretch(NamedTuple):
 
     start: int
     stop: int
-    found: SelfCorrelation
+    correlation: SelfCorrelation
 
 
 class Repeats(NamedTuple):
     """What repeats in a take.
 
-    ``stretches`` are in order of time; ``found`` is the self-correlation of the longest one, with
-    the cycles of all, or that of the take if there is none; then ``reason`` tells why.
+    ``stretches`` are in order of time; ``correlation`` is the self-correlation of the longest one,
+    with the cycles of all, or that of the take if there is none; then ``reason`` tells why.
     """
 
     stretches: list[Stretch]
-    found: SelfCorrelation
+    correlation: SelfCorrelation
     reason: str
 
 
@@ -124,15 +123,15 @@ def find_repeats(x, threshold, limits=None):
 def summary_of(stretches):
     """What repeats in a take that has stretches."""
     longest = max(stretches, key=lambda stretch: stretch.stop - stretch.start)
-    n_cycles = sum(stretch.found.n_cycles for stretch in stretches)
-    return Repeats(stretches, with_period(longest.found, longest.found.period, n_cycles), "")
+    n_cycles = sum(stretch.correlation.n_cycles for stretch in stretches)
+    return Repeats(stretches, longest.correlation._replace(n_cycles=n_cycles), "")
 
 
 def _join(take, stretches, threshold):
     """Neighbours of nearly the same period as one stretch."""
     joined = stretches[:1]
     for stretch in stretches[1:]:
-        before, (a, b) = joined[-1], (joined[-1].found, stretch.found)
+        before, (a, b) = joined[-1], (joined[-1].correlation, stretch.correlation)
         near = stretch.start - before.stop <= whole(_BETWEEN * min(a.period, b.period), "down")
         if near and _ratio(a.period, b.period) <= _SAME_PACE:
             start, stop = before.start, stretch.stop
@@ -142,9 +141,10 @@ def _join(take, stretches, threshold):
                 or _ratio(correlation.period, a.period) > _SAME_PACE
             ):
                 # The pace changes too much for a single period.
-                longer = max(before, stretch, key=lambda one: one.stop - one.start).found
+                longer = max(before, stretch, key=lambda one: one.stop - one.start).correlation
                 n_cycles = a.n_cycles + b.n_cycles
-                correlation = with_period(longer, (stop - start) / n_cycles, n_cycles)
+                period = (stop - start) / n_cycles
+                correlation = longer._replace(period=period, n_cycles=n_cycles)
             joined[-1] = Stretch(start, stop, correlation)
         else:
             joined.append(stretch)
@@ -237,15 +237,15 @@ class _Take:
             stop = len(self.x)
         return (start, stop) if stop - start >= whole(_LEAST_PROPOSED * period, "up") else None
 
-    def required(self, found, places, threshold):
+    def required(self, correlation, places, threshold):
         """The strength that is required of one of several places of as much movement.
 
         At a single place chance correlations exceed ``r`` with a probability of about
         ``(1 - r**2) ** (n / 2)``; their degrees of freedom ``n`` are the breadth of the take at
         each repetition.
         """
-        alone = min(required_strength(found.n_cycles, found.breadth, threshold), 1)
-        freedom = self.breadth * (found.n_cycles - 1)
+        alone = required_strength(correlation.n_cycles, correlation.breadth, threshold)
+        alone, freedom = min(alone, 1), self.breadth * (correlation.n_cycles - 1)
         return np.sqrt(1 - (1 - alone**2) * places ** (-2 / freedom))
 
 
@@ -328,7 +328,7 @@ def _best_interval(values, deepest=np.inf):
         falls = np.maximum.accumulate(sums) - sums
         if falls.max() <= deepest:
             return total, start, stop
-        middle = start + int(falls.argmax())
+        middle = start + first_largest(falls)
         sides = [(start, middle), (middle, stop)]
         first, last = max(sides, key=lambda side: _largest_sum(values, side[0], side[1])[0])
 
@@ -337,8 +337,8 @@ def _largest_sum(values, first, last):
     """The largest sum of neighbouring values in an interval, and where they begin and end."""
     sums = np.concatenate([[0], np.cumsum(values[first:last], dtype=np.float64)])
     gains = sums - np.minimum.accumulate(sums)
-    stop = int(gains.argmax())
-    return gains[stop], first + int(sums[: stop + 1].argmin()), first + stop
+    stop = first_largest(gains)
+    return gains[stop], first + first_smallest(sums[: stop + 1]), first + stop
 
 
 # -- where a cycle begins --------------------------------------------------------------------------
@@ -479,9 +479,7 @@ def _upsample(template):
 def circular_peak(curve):
     """Where a closed curve has its maximum, between samples, by a parabola."""
     k = first_largest(curve)
-    before, here, after = (curve[(k + j) % len(curve)] for j in (-1, 0, 1))
-    bend = before - 2 * here + after
-    return k + ((before - after) / (2 * bend) if bend < 0 else 0.0)
+    return k + parabola_vertex(*(curve[(k + j) % len(curve)] for j in (-1, 0, 1)))[0]
 
 
 def move_to_events(times, phases, events):

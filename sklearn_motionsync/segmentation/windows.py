@@ -63,8 +63,6 @@ class WindowDissimilarity:
     synchronizer : fitted Synchronizer
     groups : array-like (n_examples,), default=None
         Of the training performances that it keeps; by default each is its own.
-    length : bool, default=True
-        Whether the length counts.
 
     Attributes
     ----------
@@ -72,11 +70,10 @@ class WindowDissimilarity:
         That of the training performances, each compared with those of other groups.
     """
 
-    def __init__(self, synchronizer, groups=None, length=True):
+    def __init__(self, synchronizer, groups=None):
         lengths, examples = synchronizer.lengths_, synchronizer.examples_
         self._set_clock(synchronizer.features_, synchronizer.n_frames_)
-        moments = LogMoments.of(lengths)
-        self._length = moments.standardize if length else np.zeros_like
+        self._length = LogMoments.of(lengths).standardize
         self._typical_length = np.exp(np.log(lengths).mean())
         count = len(examples)
         positions = self._positions(examples)

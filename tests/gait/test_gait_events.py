@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import DenseSynchronizer, Skeleton, gait_events
 from sklearn_motionsync.datasets import make_walk
-from sklearn_motionsync.gait.feet import Walk, joints_of_feet
+from sklearn_motionsync.gait.recordings import Walk, joints_of_feet
 from sklearn_motionsync.io import cut_at_events, keyframes_from_events
 
 LABELS = ("Foot Strike", "Foot Off")

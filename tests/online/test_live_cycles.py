@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    LivePhase,
     OnlineSynchronizer,
 )
 from sklearn_motionsync.datasets import load_performances, make_gait
@@ -133,7 +132,7 @@ def test_pickled_cycles_go_on(live, walk):
     other = pickle.loads(pickle.dumps(live))
     for frame in x[200:300]:
         now, same = live.step(frame), other.step(frame)
-        assert (*now, now.cycle) == (*same, same.cycle)
+        assert now == same
 
 
 def test_cycles_go_on_while_nothing_is_seen(fitted, walk):
@@ -338,16 +337,6 @@ def test_actions_that_do_not_end_where_they_begin_are_refused():
     X = [np.sin(np.linspace(-1.5, 1.5, n))[:, np.newaxis] ** [1, 3] for n in (40, 45, 50)]
     with pytest.raises(ValueError, match=r"ends 3.* times .* CycleSegmenter"):
         OnlineSynchronizer(DenseSynchronizer(P), cyclic=True).fit(X)
-
-
-def test_live_phase_is_a_tuple_of_five_with_a_cycle():
-    now = LivePhase(1.0, 1.1, 0.9, 0.5, 2.0, cycle=3)
-    phase, rate, confidence, lower, upper = now
-    assert (phase, rate, confidence, lower, upper) == (1.0, 1.1, 0.9, 0.5, 2.0)
-    assert LivePhase(1.0, 1.0, 1.0).cycle is None
-    for other in (copy.deepcopy(now), pickle.loads(pickle.dumps(now))):
-        assert (other, other.cycle) == (now, 3)
-    assert repr(now).endswith("upper=2.0, cycle=3)")
 
 
 # -- single actions that begin anew ---------------------------------------------------------

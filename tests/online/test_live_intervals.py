@@ -250,7 +250,7 @@ def test_streams_side_by_side_equal_streams_alone(fitted, live, clips):
     assert live.history.lower.shape == (len(x), 2)
     live.reset()
     assert all(len(values) == 0 for values in live.history)
-    assert len(live.history) == 5
+    assert len(live.history) == 6
 
 
 def test_calibration_is_the_lowest_temperature_that_holds_nine_tenths():

@@ -9,10 +9,11 @@ from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 from sklearn_motionsync import LinearSynchronizer, MotionTracker
 from sklearn_motionsync.online import members
-from sklearn_motionsync.online.members import RunningTake, pool
-from sklearn_motionsync.online.particle_filter import (
+from sklearn_motionsync.online.members import (
     ParticleFilter,
     Particles,
+    RunningTake,
+    pool,
     systematic_resampling,
     weighted_median,
 )

@@ -186,18 +186,26 @@ def test_incomplete_adds_the_first_and_last_part_cycle():
     assert locations["stop"].iloc[-1] == len(take)
 
 
+def body_at_rest(n_frames):
+    """The joints (n_frames, 15, 3) of a body that stands and faces along z."""
+    place = {"pelvis": (0, 1), "neck": (0, 1.5), "head": (0, 1.7)}
+    height = {"hip": 1, "knee": 0.5, "ankle": 0.05, "shoulder": 1.5, "elbow": 1.2, "wrist": 1}
+    joints = np.zeros((n_frames, 15, 3))
+    for k, joint in enumerate(Skeleton.paper().joints):
+        side, _, part = joint.rpartition("_")
+        joints[:, k, 0] = {"left": 0.2, "right": -0.2, "": 0}[side]
+        joints[:, k, 1] = height.get(part, place.get(joint, (0, 1))[1])
+    return joints
+
+
 def test_cycles_begin_with_the_foot_that_is_farther_ahead():
     """Legs that swing, the left one farther, of a body that walks in a curve."""
     skeleton, t = Skeleton.paper(), np.linspace(0, 1, 400)
-    place = {"pelvis": (0, 1), "neck": (0, 1.5), "head": (0, 1.7)}
-    joints = np.zeros((len(t), 15, 3))
+    joints = body_at_rest(len(t))
     for k, joint in enumerate(skeleton.joints):
-        side = 1 if joint.startswith("left") else -1 if joint.startswith("right") else 0
-        part = joint.split("_")[-1]
-        height = {"hip": 1, "knee": 0.5, "ankle": 0.05, "shoulder": 1.5, "elbow": 1.2, "wrist": 1}
-        swing = {"knee": 0.15, "ankle": 0.4}.get(part, 0) * (1.2 if side > 0 else 1)
-        joints[:, k, 0] = 0.2 * side
-        joints[:, k, 1] = height.get(part, place.get(joint, (0, 1))[1])
+        side = 1 if joint.startswith("left") else -1
+        swing = {"knee": 0.15, "ankle": 0.4}.get(joint.split("_")[-1], 0)
+        swing *= 1.2 if side > 0 else 1
         joints[:, k, 2] = side * swing * np.cos(2 * np.pi * (5 * t - 0.3))
     turn = 3 * t[:, np.newaxis]
     x, z = joints[..., 0] + 2, joints[..., 2].copy()
@@ -211,6 +219,18 @@ def test_cycles_begin_with_the_foot_that_is_farther_ahead():
         assert cycles[0].shape[1] == 45
         true = (np.arange(6) + phase) / 5 * 399
         np.testing.assert_allclose(locations["start"], true[: len(locations)], atol=3)
+
+
+@pytest.mark.parametrize(("swing", "is_foot"), [(0.03, False), (0.04, True)])
+def test_cycles_begin_with_a_foot_in_gait_only(swing, is_foot):
+    """A body that nods; its ankles move against each other by four swings, of a leg of 0.95."""
+    t = np.linspace(0, 1, 400)
+    joints = body_at_rest(len(t))
+    nod = np.sin(2 * np.pi * 5 * t)
+    joints[:, 2] += nod[:, np.newaxis] * [0, -0.1, 0.3]
+    joints[:, [8, 14], 2] += swing * nod[:, np.newaxis] * [1, -1]
+    start = CycleSegmenter(Skeleton.paper()).fit(joints.reshape(len(t), -1)).start_
+    assert (start in ("left", "right")) == is_foot
 
 
 def test_warns_where_several_cycles_fit_and_period_selects_one():
