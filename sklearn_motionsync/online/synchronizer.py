@@ -66,12 +66,6 @@ class OnlineSynchronizer(
     frame_rate : float, default=None
         Frames a second of the training performances. Times are then in seconds; without it
         in frames of the training performances.
-    smoothness : float, default=0.1
-        Weight of the change of pace, ``mu``, in units of the mean squared norm of the features.
-    velocity_smoothing : float, default=0.03
-        Time constant of the causal filter of velocities, as a share of the clock.
-    max_rate : float, default=3
-        Largest rate, in units of the mean pace.
     cyclic : bool, default=False
         Whether the training performances are cycles of a movement that repeats, such as strides cut
         by `CycleSegmenter`: each ends where it begins. The phase then begins anywhere in the cycle,
@@ -105,10 +99,10 @@ class OnlineSynchronizer(
     unpickled estimator, goes on by itself from there.
 
     The features are those of the synchronizer, with its learnt metric, from causal velocities and
-    from postures less the mean posture. The velocity filters delay both sequences alike. The phase
-    may go back when later frames contradict it. No rest is needed before the beginning: a
-    performer at rest there stays in the first frames of the clock. In the last posture the phase
-    is the end, P - 1.
+    from postures less the mean posture. The velocity filters delay both sequences alike. The rate
+    is at most 3. The phase may go back when later frames contradict it. No rest is needed before
+    the beginning: a performer at rest there stays in the first frames of the clock. In the last
+    posture the phase is the end, P - 1.
 
     When the movement begins anew, before its end or after it, the phase goes back and
     ``LivePhase.cycle`` rises: as soon as a path that began again, at a cost of 6 temperatures,
@@ -176,9 +170,6 @@ class OnlineSynchronizer(
     _parameter_constraints: dict = {
         "synchronizer": [Synchronizer, None],
         "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
-        "smoothness": [Interval(Real, 0, None, closed="left")],
-        "velocity_smoothing": [Interval(Real, 0, 1, closed="left")],
-        "max_rate": [Interval(Real, 1, None, closed="left")],
         "cyclic": ["boolean"],
     }
 
@@ -188,16 +179,10 @@ class OnlineSynchronizer(
         self,
         synchronizer: Synchronizer | None = None,
         frame_rate: float | None = None,
-        smoothness: float = 0.1,
-        velocity_smoothing: float = SMOOTHING,
-        max_rate: float = 3,
         cyclic: bool = False,
     ) -> None:
         self.synchronizer = synchronizer
         self.frame_rate = frame_rate
-        self.smoothness = smoothness
-        self.velocity_smoothing = velocity_smoothing
-        self.max_rate = max_rate
         self.cyclic = cyclic
 
     @validated_with_nested
@@ -244,16 +229,7 @@ class OnlineSynchronizer(
             duration = float(np.mean([len(x) for x in performances]) - 1)
 
             def reference_of(mean, *calibration):
-                return Reference(
-                    sync.features_,
-                    mean,
-                    duration,
-                    self.smoothness,
-                    self.velocity_smoothing,
-                    self.max_rate,
-                    *calibration,
-                    cyclic=self.cyclic,
-                )
+                return Reference(sync.features_, mean, duration, *calibration, cyclic=self.cyclic)
 
             calibration = calibrate(reference_of, performances, warped, match.times, progress)
             reference = reference_of(mean, *calibration, _RESTART * calibration[0])
@@ -403,6 +379,9 @@ class OnlineSynchronizer(
 
 # Positions a frame of the pattern.
 _SUBFRAMES = 2
+# Weight of the change of pace, ``mu``, in units of the mean squared norm of the features; and the
+# largest rate, in units of the mean pace.
+_SMOOTHNESS, _MAX_RATE = 0.1, 3
 # After the end the last posture is held for so many widths of the velocity filters, after which
 # these have forgotten the movement.
 _REST = 6
@@ -423,8 +402,6 @@ class Reference:
         The mean performance.
     duration : float
         Mean duration of the training performances, in their frames.
-    smoothness, velocity_smoothing, max_rate : float
-        As of the `OnlineSynchronizer`.
     temperature : float, default=1.0
         Path costs over it are negative log-probabilities of phases.
     typical_cost : float, default=inf
@@ -458,9 +435,6 @@ class Reference:
         features,
         mean,
         duration,
-        smoothness,
-        velocity_smoothing,
-        max_rate,
         temperature=1.0,
         typical_cost=np.inf,
         interval_temperature=1.0,
@@ -470,7 +444,7 @@ class Reference:
         last = len(mean) - 1
         self.cyclic, self.restart_cost = cyclic, restart_cost
         self.cost, self.metric, self.unit = features.cost, features.metric, features.unit
-        self.n_frames, self.width, self.step = len(mean), velocity_smoothing * last, duration / last
+        self.n_frames, self.width, self.step = len(mean), SMOOTHING * last, duration / last
         self.duration = self.step * last
         self.temperature, self.typical_cost = temperature, typical_cost
         self.interval_temperature = interval_temperature
@@ -483,9 +457,9 @@ class Reference:
         self.speed = np.square(self._velocity[: self._n_positions]).mean(axis=0)
         self.features, self._cached = self._subset(np.arange(mean.shape[1])), {}
         self.moving = self.features.moving
-        mu = smoothness * float(np.square(self.moving).sum(axis=1).mean())
+        mu = _SMOOTHNESS * float(np.square(self.moving).sum(axis=1).mean())
         # No step is longer than the pattern.
-        table = step_table(self.cost, min(max_rate, last), _SUBFRAMES)
+        table = step_table(self.cost, min(_MAX_RATE, last), _SUBFRAMES)
         self.trellis = Trellis(table, mu, last + rest, running=True)
 
     def begin(self, n_streams=1):

@@ -85,9 +85,9 @@ def test_phase_and_rate_follow_known_warps(fitted, n_frames, bend):
     assert np.mean(found.confidence) > (0.8 if bend == 0 else 0.3)
 
 
-@pytest.mark.parametrize("action", ["depositFloorR", "grabHighR"])
-def test_phase_of_new_person_is_near_offline_path(real_data, action):
+def test_phase_of_new_person_is_near_offline_path(real_data):
     clips, n_frames = load_performances(real_data / "hdm05" / "hdm05_positions.npz"), 100
+    action, other = "grabHighR", "depositFloorR"
 
     def load(action, held_out):
         """Clips at 30 frames a second, by one actor or by the others."""
@@ -105,7 +105,6 @@ def test_phase_of_new_person_is_near_offline_path(real_data, action):
         errors.append(np.abs(found.phase - offline)[clock >= n_frames / 5])
     assert np.median(np.concatenate(errors)) < 3.5
     # The confidence of another action is less than half of that.
-    other = {"depositFloorR": "grabHighR", "grabHighR": "depositFloorR"}[action]
     others = live.track(features.transform(load(other, held_out=True)))
     right, wrong = (
         np.median([found.confidence[len(found.phase) // 2 :].mean() for found in some])
@@ -130,7 +129,7 @@ def test_track_equals_step_and_does_not_look_ahead(fitted, live):
 def test_costs_at_the_end_equal_offline_trellis_to_the_last_bit():
     mean, x = movement(np.linspace(0, 1, P)), performance(75, 0.4, 0.05)[0]
     unit = Unit.of(mean[np.newaxis])
-    reference = Reference(Features("velocity", 0.03, unit), mean, P - 1, 0.1, 0.03, 3)
+    reference = Reference(Features("velocity", 0.03, unit), mean, P - 1)
     streams = Streams(reference, 1, 3)
     for frame in x:
         streams.update(frame[np.newaxis])
@@ -254,8 +253,7 @@ def test_estimates_of_streams_equal_their_definitions():
     """Rate, confidence and mean cost of two streams, one of which is hidden at times."""
     X = [performance(50 + i, 0.1 * (i - 3), 0.02, i)[0] for i in range(7)]
     live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X)
-    settings = live.duration_, 0.1, 0.03, 3
-    reference = Reference(live.synchronizer_.features_, live.mean_, *settings, 8.0, 1.5)
+    reference = Reference(live.synchronizer_.features_, live.mean_, live.duration_, 8.0, 1.5)
     # The last posture is held until the filters, 1.77 frames wide, have forgotten the movement.
     assert len(reference.moving) == 2 * (P - 1) + 1 + 2 * 11
     streams = Streams(reference, 2, 3)
@@ -403,12 +401,6 @@ def test_constant_and_equal_training_performances():
     assert many.confidence[20:].max() < 0.1
 
 
-def test_max_rate_is_bounded_by_the_pattern():
-    X = [performance(20, bend)[0] for bend in (0.0, 0.3)]
-    a, b = (OnlineSynchronizer(DenseSynchronizer(20), max_rate=r).fit(X) for r in (19, 1e9))
-    np.testing.assert_array_equal(a.track(X), b.track(X))
-
-
 def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
     """By frames of streams: the likeliest temperature, and the median of the largest mean costs.
 
@@ -421,7 +413,7 @@ def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
     warped, last = match.warp(X), P - 1
 
     def reference_of(mean):
-        return Reference(live.synchronizer_.features_, mean, live.duration_, 0.1, 0.03, 3)
+        return Reference(live.synchronizer_.features_, mean, live.duration_)
 
     energy = np.square(reference_of(live.mean_).moving).sum(axis=1).mean()
     temperatures = energy * np.geomspace(0.01, 1e3, 41)
@@ -474,29 +466,6 @@ def test_refused_frame_changes_nothing(fitted, live):
         assert live.step(frame) == expected[k]
 
 
-@pytest.mark.parametrize(
-    ("name", "good", "bad"),
-    [
-        ("max_rate", 1, (0.99, np.inf)),
-        ("smoothness", 0, (-0.1, np.inf)),
-        ("velocity_smoothing", 0, (-0.1, 1)),
-        ("frame_rate", 1e-3, (0, np.inf)),
-    ],
-)
-def test_bounds_of_parameters(name, good, bad):
-    X = [performance(20)[0]] * 2
-    live = OnlineSynchronizer(LinearSynchronizer())
-    assert np.isfinite(clone(live).set_params(**{name: good}).fit(X).track(X[:1])[0]).all()
-    for value in bad:
-        with pytest.raises(ValueError, match=f"'{name}' parameter"):
-            clone(live).set_params(**{name: value}).fit(X)
-
-
-def test_parameters_of_the_synchronizer_are_checked():
-    with pytest.raises(ValueError, match="'max_rate' parameter of DenseSynchronizer"):
-        OnlineSynchronizer(DenseSynchronizer(max_rate="3")).fit([performance(20)[0]] * 2)
-
-
 def test_methods_before_fit_are_refused():
     live = OnlineSynchronizer()
     for call in (live.reset, live.time_left, lambda: live.history, lambda: live.step([0.0])):
@@ -520,7 +489,7 @@ def test_unknown_streams_and_wrong_times_are_refused(fitted, live):
 
 def test_time_stamps_that_come_twice_are_refused():
     """At any frame rate: seconds that are rounded are compared as frames."""
-    for seconds in np.random.default_rng(0).uniform(0, 100, 300):
+    for seconds in np.random.default_rng(0).uniform(0, 100, 40):
         (frames,) = check_times(seconds, 1, 29.97)
         with pytest.raises(ValueError, match="must increase"):
             check_times(seconds, 1, 29.97, after=frames)
@@ -532,15 +501,14 @@ def test_time_stamps_that_come_twice_are_refused():
         check_times([0, 1e300], 2, 1e10)
 
 
-@pytest.mark.parametrize("origin", [-1e6, 1e9, 1e17])
-def test_phases_do_not_depend_on_the_origin_of_time(fitted, origin):
+def test_phases_do_not_depend_on_the_origin_of_time():
     """1e17 is a time in nanoseconds, where the next number is 16 later."""
     x, _ = performance(60, 0.3, 0.02, 4)
     times = np.arange(0, 960, 16.0)
     slow = OnlineSynchronizer(LinearSynchronizer()).fit(
         [np.repeat(performance(50, b, 0.02, i)[0], 16, axis=0) for i, b in enumerate((-0.2, 0.2))]
     )
-    (expected,), (found,) = slow.track([x], [times]), slow.track([x], [times + origin])
+    (expected,), (found,) = slow.track([x], [times]), slow.track([x], [times + 1e17])
     np.testing.assert_array_equal(found.phase, expected.phase)
 
 

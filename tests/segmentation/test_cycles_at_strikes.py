@@ -16,8 +16,8 @@ def strikes(x, skeleton, context, rate):
     return found.loc[rows, "frame"].to_numpy()
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_cuts_of_people_not_seen_are_the_strikes(side):
+def test_cuts_of_people_not_seen_are_the_strikes():
+    side = "right"
     segmenter = CycleSegmenter(WALK.skeleton, start=f"{side} strike", frame_rate=100)
     _, table = segmenter.fit(WALK.data[:2]).segment(WALK.data[2:])
     assert segmenter.start_ == f"{side} strike"
@@ -34,21 +34,22 @@ def test_cuts_of_people_not_seen_are_the_strikes(side):
 
 
 def test_phases_are_whole_at_strikes():
-    segmenter = CycleSegmenter(WALK.skeleton, start="left strike", frame_rate=100).fit(WALK.data)
-    for x, phases in zip(WALK.data, segmenter.phases(WALK.data), strict=True):
+    segmenter = CycleSegmenter(WALK.skeleton, start="left strike", frame_rate=100)
+    X = WALK.data[:2]
+    for x, phases in zip(X, segmenter.fit(X).phases(X), strict=True):
         at = np.interp(strikes(x, WALK.skeleton, "Left", 100), np.arange(len(x)), phases)
         assert np.abs(at - np.round(at)).max() < 0.01
 
 
 def test_frame_rate_of_tables():
     tables = []
-    for x in WALK.data:
+    for x in WALK.data[:2]:
         df = pd.DataFrame(x, columns=WALK.skeleton.column_names)
         df.attrs |= {"frame_rate": 100.0, "up": "y"}
         tables.append(df)
-    plain = CycleSegmenter(WALK.skeleton, start="left strike", frame_rate=100).fit(WALK.data)
+    plain = CycleSegmenter(WALK.skeleton, start="left strike", frame_rate=100).fit(WALK.data[:2])
     known = CycleSegmenter(WALK.skeleton, start="left strike").fit(tables)
-    expected, found = (s.segment(X)[1] for s, X in ((plain, WALK.data), (known, tables)))
+    expected, found = (s.segment(X)[1] for s, X in ((plain, WALK.data[:2]), (known, tables)))
     assert found["start"].tolist() == expected["start"].tolist()
 
 

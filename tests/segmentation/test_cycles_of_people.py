@@ -33,7 +33,8 @@ def test_single_actions_are_not_cyclic(cycles, read):
     for archive, labels in cycles.SINGLE.items():
         for label in labels:
             bunch = read(archive, label)
-            assert not CycleSegmenter(bunch.skeleton).report(bunch.data)["cyclic"].any(), label
+            takes = bunch.data[::3]
+            assert not CycleSegmenter(bunch.skeleton).report(takes)["cyclic"].any(), label
     bunch = read("hdm05", cycles.ONE_CYCLE)
     with pytest.raises(ValueError, match=r"Performance 0: (not cyclic|holds)"):
         CycleSegmenter(bunch.skeleton).fit(bunch.data)

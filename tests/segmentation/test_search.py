@@ -346,7 +346,7 @@ def at_30():
     return make_pipeline(*steps).fit(X, actionmodel__groups=SUBJECTS)
 
 
-@pytest.mark.parametrize("rate", [7.5, 15, 29.97, 50, 60, 120])
+@pytest.mark.parametrize("rate", [7.5, 29.97, 120])
 def test_takes_of_another_frame_rate_are_resampled(at_30, rate):
     take = table(TAKE, rate)
     performances, locations = find_performances(at_30, take)
@@ -390,8 +390,8 @@ def test_warns_if_one_frame_rate_only_is_known(pipe, at_30):
         find_performances(sync, table(TAKE, 60))
 
 
-@pytest.mark.parametrize("rate", [7.5, 60, 120])
-def test_rates_may_be_given(pipe, at_30, rate):
+def test_rates_may_be_given(pipe, at_30):
+    rate = 60
     expected = find_performances(at_30, table(TAKE, rate))[1]
     arrays = [table(TAKE, rate).to_numpy(), TAKE]
     parts, found = find_performances(pipe, arrays, frame_rate=[rate, 30], pattern_rate=30)
@@ -517,7 +517,7 @@ def test_threshold_of_a_take_rejects_a_crowd_and_lies_in_gaps():
         hits = np.array(hits)
         for n_lengths, n in ((9, 1), (45, 1), (450, 10)):
             found = measure.threshold_of_take(limit, hits, n_lengths * typical)
-            best = max(value(level, hits, n) for level in np.linspace(0.1, limit, 3000))
+            best = max(value(level, hits, n) for level in np.linspace(0.1, limit, 600))
             assert value(found, hits, n) == pytest.approx(best, abs=0.01)
             assert found < limit or n > 1
     # Of a single performance nothing is known.

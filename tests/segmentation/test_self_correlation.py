@@ -54,7 +54,7 @@ def test_correlation_of_a_drifting_curve_is_pearsons_at_every_lag(drift):
 
 
 @pytest.mark.parametrize("period", [9.6, 37.3, 250.0])
-@pytest.mark.parametrize("n_cycles", [1.65, 2.3, 12.0, 40.0])
+@pytest.mark.parametrize("n_cycles", [1.65, 12.0])
 def test_period_of_waves(period, n_cycles):
     found = self_correlation(waves(round(n_cycles * period), period))
     assert found.period == pytest.approx(period, rel=0.02)

@@ -25,8 +25,7 @@ def places(x, **params):
     return CycleSegmenter(**params).report([x]).loc[0, "stretches"]
 
 
-@pytest.mark.parametrize("n_cycles", [1.8, 3, 20])
-@pytest.mark.parametrize("n_still", [60, 400, 2000])
+@pytest.mark.parametrize(("n_cycles", "n_still"), [(1.8, 60), (3, 400), (1.8, 2000), (20, 400)])
 def test_a_movement_between_standing_is_found(n_cycles, n_still):
     n = round(n_cycles * 60)
     x = np.concatenate([standing(n_still), waves(n, 60), standing(n_still, 1)])
