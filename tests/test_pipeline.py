@@ -30,10 +30,7 @@ from sklearn_motionsync.display import (
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "plot_bending.py"
-PARAMETERS = {
-    "aspace__n_components": [4, 8],
-    "densesynchronizer__max_offset": [0.15, 0.25],
-}
+PARAMETERS = {"aspace__n_components": [4, 8], "densesynchronizer__max_offset": [0.25]}
 
 
 def make_pipe(skeleton, synchronizer=None):
@@ -57,12 +54,12 @@ def test_pipeline_scores_predicts_and_samples(people):
     assert pipe[-1].sample(5, random_state=0).shape == (5, 60, 8)
 
 
-def test_grid_search(people):
-    search = GridSearchCV(make_pipe(people.skeleton), PARAMETERS, cv=2, error_score="raise")
-    search.fit(people.data)
+def test_grid_search(bends):
+    search = GridSearchCV(make_pipe(bends.skeleton), PARAMETERS, cv=2, error_score="raise")
+    search.fit(bends.data)
     assert set(search.best_params_) == set(PARAMETERS)
     assert np.isfinite(search.cv_results_["mean_test_score"]).all()
-    assert search.predict(people.data[:3]).shape == (3,)
+    assert search.predict(bends.data[:3]).shape == (3,)
 
 
 def test_dense_beats_linear_on_held_out_actors(bends):
@@ -101,8 +98,6 @@ def nestings(skeleton, synchronizer):
     return {
         "flat": make_pipeline(*steps),
         "postures inside": make_pipeline(make_pipeline(cosines, aspace), *steps[2:]),
-        "across": make_pipeline(cosines, make_pipeline(aspace, synchronizer), steps[3]),
-        "first and alone": make_pipeline(cosines, aspace, make_pipeline(synchronizer), steps[3]),
         "deep": make_pipeline(make_pipeline(cosines, make_pipeline(aspace, *steps[2:]))),
         "nothing between": make_pipeline(
             cosines,
@@ -287,23 +282,17 @@ def test_example_reports_bad_arguments_in_one_line(monkeypatch, capsys, argument
     assert message in err
 
 
-def test_example_ignores_notebook_arguments(monkeypatch, capsys, tmp_path):
-    """Those of the kernel are not for it."""
+def test_example_in_a_notebook_on_the_embedded_data(monkeypatch, capsys, tmp_path):
+    """Arguments of the kernel are not for it. CI runs it as a script."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["ipykernel_launcher.py", "-f", "kernel.json"])
-    # Fewer than as a script: what they are is checked there.
     code = EXAMPLE.read_text()
     assert code.count("make_bending(random_state=0)") == 1
     code = code.replace("make_bending(", "make_bending(9, n_actors=3, n_frames=40, ")
     exec(compile(code, "cell", "exec"), {"__name__": "__main__"})
-    assert "9 of bending" in capsys.readouterr().out
-    assert_figures(tmp_path)
-
-
-def test_example_on_the_embedded_data(monkeypatch, capsys, tmp_path):
-    out = run_example(monkeypatch, capsys, "--output", tmp_path)
+    out = capsys.readouterr().out
     for words in (
-        "40 of bending",
+        "9 of bending",
         "template",
         "spread, dense",
         "key-frames missed",
