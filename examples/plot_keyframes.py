@@ -85,7 +85,7 @@ _ = figure.suptitle("Heel strikes bring back the walk that went astray")
 
 sync = DenseSynchronizer(151).fit(trials, keyframes=keyframes)
 display = SynchronizationDisplay.from_estimator(
-    sync, trials, keyframes=keyframes, unit="percent", warps=False
+    sync, trials, keyframes=keyframes, unit="percent", units="degrees", warps=False
 )
 _ = display.figure_.suptitle("Lines and ticks are the heel strikes that were given")
 

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from sklearn_motionsync import DirectionCosines, MotionTracker
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.display import TrackingDisplay
+from sklearn_motionsync.display import SkeletonDisplay, TrackingDisplay
 
 RATE, NOISE = 30, 0.05
 known = make_bending(16, n_frames=80, n_actors=8, style=2, frame_rate=RATE, random_state=0)
@@ -119,15 +119,11 @@ _ = display.figure_.suptitle("Hidden limbs (violet) follow the true body (pale)"
 # %%
 # The smoother, with what was seen and the truth beside it:
 
-repaired = TrackingDisplay(
-    smoothed[0],
-    observed=seen[0],
-    truth=truth[0],
-    names=names,
-    times=np.arange(len(seen[0])) / RATE,
-    unit="seconds",
+hiding = DirectionCosines(known.skeleton, hidden="nan").fit(known.data)
+bodies = hiding.inverse_transform([seen[0], smoothed[0].postures, truth[0]])
+people = SkeletonDisplay.from_performances(
+    bodies, known.skeleton, names=["seen", "estimate", "truth"]
 )
-people = repaired.side_by_side(cosines)
 animation = people.animate(seconds=2.5, fps=8)
 plt.close()  # the player below shows it
 animation

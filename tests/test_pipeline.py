@@ -123,7 +123,7 @@ def said_of(pipe, X):
     scores = [scorer(pipe, X) for scorer in (SpreadScorer(), FeatureHoldoutScorer())]
     model = ActionModelDisplay.from_estimator(pipe, X, features="pelvis_height")
     times, share = Match.from_estimator(pipe, X).times, MetricDisplay.from_estimator(pipe).share
-    return [scores, times, share, model.groups[0].performances]
+    return [scores, times, share, model.performances]
 
 
 @pytest.mark.parametrize("name", NESTINGS)
@@ -134,9 +134,9 @@ def test_synchronizer_is_found_in_nested_pipelines(name, few, flat):
         for one, other in zip(flat[1], said_of(pipe, few.data), strict=True):
             np.testing.assert_array_equal(one, other)
     figures = SynchronizationDisplay.from_estimator(pipe, few.data)
-    assert figures.feature_names == ["aspace0", "aspace1", "aspace2", "aspace3"]
-    assert TrellisDisplay.from_estimator(pipe, few.data).costs.shape[0] == 40
-    assert sorted(MetricDisplay.from_estimator(pipe).feature_names) == figures.feature_names
+    assert figures.ylabels == ["aspace0", "aspace1", "aspace2", "aspace3"]
+    assert TrellisDisplay.from_estimator(pipe, few.data).space.costs.shape[0] == 40
+    assert sorted(MetricDisplay.from_estimator(pipe).feature_names) == figures.ylabels
     assert len(SkeletonDisplay.from_estimator(pipe, few.data).axes_) == 2
     assert len(SkeletonDisplay.from_model(pipe, n_samples=2).axes_) == 4
 
@@ -192,7 +192,7 @@ def test_displays_and_scorers_take_key_frames(nested, routing, few):
     np.testing.assert_array_equal(display.match.times, expected.times)
     after = sync.transform(points, keyframes=K)[:, :, :1]
     np.testing.assert_array_equal(display.after, after)
-    np.testing.assert_array_equal(model.groups[0].performances, after)
+    np.testing.assert_array_equal(model.performances, after)
     assert len(people.axes_) == 2
 
 
@@ -236,7 +236,7 @@ def test_key_frames_reach_a_step_before_the_synchronizer(few):
     marked = steps[0].transform(points, keyframes=K)
     display = TrellisDisplay.from_estimator(pipe, points, performance=2, keyframes=K)
     expected = TrellisDisplay.from_estimator(steps[1], marked, performance=2)
-    np.testing.assert_array_equal(display.costs, expected.costs)
+    np.testing.assert_array_equal(display.space.costs, expected.space.costs)
     message = r"TrellisDisplay.from_estimator\(estimator, X, keyframes="
     with pytest.raises(ValueError, match=message):
         TrellisDisplay.from_estimator(pipe, points)

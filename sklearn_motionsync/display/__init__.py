@@ -7,12 +7,11 @@ attributes with a trailing underscore. matplotlib, in the extra ``plot``, is imp
 
 from .cycles import CycleDisplay
 from .gait import GaitDisplay
-from .groups import GroupDisplay
+from .groups import GroupDisplay, NormDisplay
 from .lags import LagDisplay
 from .live import PhaseDisplay
 from .metric import MetricDisplay
 from .model import ActionModelDisplay
-from .norm import NormDisplay
 from .search import SearchDisplay
 from .stick_figures import SkeletonDisplay
 from .synchronization import SynchronizationDisplay

@@ -1,13 +1,22 @@
-"""Animations of displays, played in a notebook without a network connection."""
+"""Displays that move, and their animations, which a notebook plays without a network."""
+
+from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..matching.counting import whole
-from .drawing import pyplot
+from .base import AxesLike, Display, pyplot
 
-__all__ = ["animate"]
+if TYPE_CHECKING:
+    from matplotlib.animation import Animation
+else:
+    # matplotlib is imported on drawing.
+    Animation = Any
+
+__all__ = ["MovingDisplay"]
 
 # Resolution of the pictures: the notebook stores all of them.
 _DPI = 64
@@ -15,53 +24,60 @@ _DPI = 64
 _MAX_PICTURES = 25_000
 
 
-def animate(display, show, ax, *, seconds, fps, azimuth):
-    """Draw a display and return its animation.
+class MovingDisplay(Display):
+    """The base of displays that move: `_show` moves what is drawn to a share of the time."""
 
-    Parameters
-    ----------
-    display : display with ``plot``
-    show : callable
-        ``show(k, last)`` draws picture k, from 0 to ``last``.
-    ax : Axes or array-like of Axes, or None
-        By default the axes on which the display was drawn last. Then the figure is closed after the
-        notebook has shown the animation.
-    seconds, fps : float
-        Duration of the animation, and pictures a second.
-    azimuth : float
+    def animate(
+        self,
+        ax: AxesLike | None = None,
+        *,
+        seconds: float = 5.0,
+        fps: int = 15,
+        azimuth: float = -60,
+    ) -> Animation:
+        """Animate the performances.
 
-    Returns
-    -------
-    FuncAnimation
-        Its ``save`` is that of Matplotlib, but for the layout, which is computed once.
-    """
+        Parameters
+        ----------
+        ax : Axes or array-like of Axes, default=None
+            As for `plot`; by default the axes of the last plot. Then the figure is closed after the
+            notebook has shown the animation.
+        seconds : float, default=5.0
+            The time until the longest performance ends.
+        fps : int, default=15
+            Pictures a second; each takes 10 to 50 kB of a notebook.
+        azimuth : float, default=-60
+            The direction of the viewer in degrees, as in `plot`.
+
+        Returns
+        -------
+        Animation
+            A notebook plays it as the last value of a cell; ``to_jshtml()`` gives the HTML,
+            ``save(path)`` a GIF or a video, for which Matplotlib draws the whole figure picture by
+            picture. `write_player` is the fast way to moving bodies, and its file is smaller.
+        """
+        if not (0 < seconds < np.inf and 0 < fps < np.inf):
+            raise ValueError(f"seconds and fps must be above 0, got {seconds!r} and {fps!r}.")
+        if seconds * fps > _MAX_PICTURES:
+            raise ValueError(
+                f"seconds={seconds!r} at fps={fps!r} are {seconds * fps:.3g} pictures, more than "
+                f"{_MAX_PICTURES}; choose fewer."
+            )
+        display: Any = self
+        display.plot(getattr(self, "axes_", None) if ax is None else ax, azimuth=azimuth)
+        count = max(2, whole(seconds * fps))
+        return _animate(self.figure_.canvas.figure, self._show, count, fps, closes=ax is None)
+
+    def _show(self, share):
+        """Move to a share of the time from 0 to 1."""
+        raise NotImplementedError
+
+
+def _animate(figure, show, count, fps, *, closes):
+    """An animation of a figure that computes its layout once and needs no network."""
     from matplotlib.animation import FuncAnimation
 
-    if not (0 < seconds < np.inf and 0 < fps < np.inf):
-        raise ValueError(f"seconds and fps must be above 0, got {seconds!r} and {fps!r}.")
-    if seconds * fps > _MAX_PICTURES:
-        raise ValueError(
-            f"seconds={seconds!r} at fps={fps!r} are {seconds * fps:.3g} pictures, more than "
-            f"{_MAX_PICTURES}; choose fewer."
-        )
-    count = max(2, whole(seconds * fps))
-    display.plot(getattr(display, "axes_", None) if ax is None else ax, azimuth=azimuth)
-    figure = display.figure_.canvas.figure
-    # Looked up here: nothing can be imported while Python shuts down.
-    exists, numbered, current = pyplot().fignum_exists, pyplot().figure, pyplot().gcf
-
-    def is_open():
-        """Whether the figure is not closed; its number may be that of a later one by then."""
-        if not exists(getattr(figure, "number", None)):
-            return False
-        before = current().number
-        is_same = numbered(figure.number) is figure
-        numbered(before)
-        return is_same
-
     class NotebookAnimation(FuncAnimation):
-        """An animation that computes the layout once and needs no network."""
-
         def save(self, *args, **kwargs):
             # The layout takes longer than the drawing, and each picture would repeat it.
             layout = figure.get_layout_engine()
@@ -80,18 +96,16 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
                 return embed_buttons(super().to_jshtml(*args, **kwargs))
 
         def __del__(self):
-            # Matplotlib warns of an animation that was not shown, unless its figure is closed.
-            if is_open():
-                super().__del__()
+            """Without the warning of Matplotlib that the animation was not shown."""
 
         def _repr_html_(self):
             html = self.to_jshtml()
-            if ax is None:
+            if closes:
                 pyplot().close(figure)
             return html
 
     return NotebookAnimation(
-        figure, lambda k: show(k, count - 1), frames=count, interval=1000 / fps, blit=False
+        figure, lambda k: show(k / (count - 1)), frames=count, interval=1000 / fps, blit=False
     )
 
 

@@ -3,33 +3,18 @@
 from collections.abc import Iterable, Mapping, Set
 from itertools import takewhile
 from numbers import Real
-from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pandas as pd
-from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
 from ..inputs.facts import units_of_columns
 from ..inputs.numbers import is_integer
 from ..inputs.tables import labels_of
-from ..online.stream import check_times
 from ..utils.pipelines import flat_steps
-
-if TYPE_CHECKING:
-    from matplotlib.animation import Animation
-    from matplotlib.axes import Axes
-
-    AxesLike: TypeAlias = Axes | Iterable[Axes] | np.ndarray
-else:
-    # matplotlib is imported on drawing.
-    Animation = AxesLike = Any
 
 __all__ = [
     "TIME_LABELS",
-    "Animation",
-    "AxesLike",
-    "Takes",
     "as_frames",
     "as_index",
     "as_indices",
@@ -37,7 +22,6 @@ __all__ = [
     "as_performances",
     "labels_as_text",
     "labels_of_signals",
-    "one_each",
     "times_from_zero",
     "undo_scaling",
 ]
@@ -132,7 +116,7 @@ def labels_of_signals(names, known_units, ylabel=None, units=None):
         In place of the names and the known units: of all signals, one each, or by name.
     """
     labels = _by_name(ylabel, names, dict(zip(names, names, strict=True)), "ylabel")
-    out = []
+    known_units, out = dict.fromkeys(names, "") | known_units, []
     for label, unit in zip(labels, _by_name(units, names, known_units, "units"), strict=True):
         space = " " if len(label) + len(unit) < _LONG else "\n"
         out.append(f"{label}{space}({unit})" if unit else label)
@@ -150,16 +134,6 @@ def _by_name(texts, names, default, what):
             signals = ", ".join(map(str, default))
             raise ValueError(f"{what}: there is no signal {name!r}; there are {signals}.")
     return [str(texts.get(name, default[name])) for name in names]
-
-
-def one_each(values, count, what, each="performances"):
-    """A list with one entry for each of ``count`` things."""
-    if not hasattr(values, "__len__") or isinstance(values, str) or len(values) != count:
-        got = len(values) if hasattr(values, "__len__") else repr(values)
-        raise ValueError(
-            f"There are {count} {each}, but {what} of {got}: give a list with one for each."
-        )
-    return list(values)
 
 
 def times_from_zero(times, n_frames):
@@ -209,59 +183,6 @@ def _keeps_features(step, width):
         return False
     names = getattr(step, "feature_names_in_", [f"x{i}" for i in range(count)])
     return list(step.get_feature_names_out()) == list(names)
-
-
-class Takes:
-    """Takes as an online estimator accepts them: one array, several, or univariate rows.
-
-    Parameters
-    ----------
-    estimator : OnlineSynchronizer or MotionTracker
-        Fitted.
-    X : takes
-    what : str, default="X"
-        The name of the argument, for messages.
-
-    Attributes
-    ----------
-    arrays : sequence of arrays (n_frames_i, n_features)
-    labels : list of str
-    is_single : bool
-        Whether X is one take instead of a collection.
-    """
-
-    def __init__(self, estimator, X, what="X"):
-        check_is_fitted(estimator)
-        self._estimator, self._rows, self.is_single = estimator, None, False
-        is_univariate = estimator.mean_.shape[1] != estimator.n_features_in_
-        if as_collection(X) is not None:
-            self.arrays = as_performances(X)
-        elif np.ndim(X) != 2:
-            raise ValueError(
-                f"{what} must be performances, or one of them, 2-D; got an array of shape "
-                f"{np.shape(X)}."
-            )
-        elif is_univariate:
-            self._rows = np.asarray(X)
-            self.arrays = list(self._rows[:, :, np.newaxis])
-            rows = X.index if isinstance(X, pd.DataFrame) else range(len(self._rows))
-            self.labels = list(map(str, rows))
-            return
-        else:
-            self.arrays, self.is_single = [X], True
-        self.labels = labels_as_text(self.arrays)
-
-    def select(self, indices):
-        """Some of the takes, as the methods of the estimator accept them."""
-        return [self.arrays[i] for i in indices] if self._rows is None else self._rows[indices]
-
-    def select_times(self, times, indices, each="performances"):
-        """The checked time stamps of some of the takes."""
-        times = [times] if self.is_single else times
-        listed, rate = one_each(times, len(self.arrays), "times", each), self._estimator.frame_rate
-        for i in indices:
-            check_times(listed[i], len(self.arrays[i]), rate, f"Performance {self.labels[i]}")
-        return [listed[i] for i in indices]
 
 
 def _as_list(values):

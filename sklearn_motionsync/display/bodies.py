@@ -10,7 +10,7 @@ from ..body.limbs import unit_vectors
 from ..body.skeleton import Skeleton, check_columns, loose_joints
 from ..inputs.numbers import as_numbers, check_finite, column_names, nanmean
 from ..matching.gaps import interpolate_gaps
-from .drawing import COLORS, bone_lines, stage
+from .base import COLORS
 
 __all__ = [
     "BodyPanel",
@@ -21,6 +21,7 @@ __all__ = [
     "place_on_floor",
     "project",
     "read_positions",
+    "stage",
 ]
 
 # The picture follows a body that walks farther than this, in heights of the body.
@@ -225,31 +226,95 @@ def bounds(places):
     return low - lacking, high + lacking
 
 
+def stage(axis, title, low, high):
+    """Prepare axes for stick figures between two corners (2,): a floor, and no scales."""
+    margin = 0.05 * (high - low)
+    axis.set_xlim(low[0] - margin[0], high[0] + margin[0])
+    axis.set_ylim(low[1] - margin[1], high[1] + margin[1])
+    axis.set_aspect("equal", anchor="S")
+    axis.set_title(title, fontsize="medium")
+    axis.set_yticks([])
+    axis.grid(False)
+    axis.set_xticks([])
+    axis.spines[:].set_visible(False)
+    axis.axhline(0, color="0.6", linewidth=1, zorder=0)
+    axis.tick_params(length=0)
+
+
 class BodyPanel:
-    """The observed body, before the mean body at the phase ahead."""
+    """The bodies of a panel: bones by side, dots, and pale shadows behind them.
 
-    def __init__(self, axis, performance, action, skeleton, azimuth):
-        self._action, self._bones = action, bones_by_side(skeleton)
-        self._bodies, self._mean = (
-            project(x, skeleton, azimuth) for x in (performance.body, action.body)
-        )
-        self.ahead = bone_lines(axis, COLORS["shadow"], 5, zorder=1)
-        self.bones = {
-            side: bone_lines(axis, COLORS[side], 2) for side in ("middle", "left", "right")
-        }
-        self.head, self._head = None, None
-        if "head" in skeleton.landmarks:
-            self._head = landmark_track(self._bodies, skeleton, "head")
-            (self.head,) = axis.plot([], [], "o", color=COLORS["middle"], markersize=5)
-        places = [x.reshape(-1, 2) for x in (self._bodies, self._mean)]
-        stage(axis, "", *bounds(np.concatenate(places)))
+    Parameters
+    ----------
+    axis : Axes
+    skeleton : Skeleton or None
+    marked : list of (int, int), default=None
+        Violet bones; all others are then grey.
+    alpha : float, default=1.0
+        The opacity of bodies in one place, which are thinner.
 
-    def show(self, now, ahead):
-        """Move to a frame, and the mean body to a phase."""
-        body, mean = self._bodies[now], self._action.interpolate(ahead, self._mean)
-        bones = [bone for of_side in self._bones.values() for bone in of_side]
-        self.ahead.set_segments([mean[list(bone)] for bone in bones])
+    Attributes
+    ----------
+    bones : dict of str to LineCollection
+        The bones of each side, and the ``"departing"`` ones. Each body is one line with gaps.
+    dots : Line2D
+        The heads; without bones all joints.
+    shadows : LineCollection
+    """
+
+    def __init__(self, axis, skeleton, *, marked=None, alpha=1.0):
+        self._skeleton, by_side = skeleton, bones_by_side(skeleton)
+        self._bones = by_side
+        self._all = [bone for bones in by_side.values() for bone in bones]
+        width = 2.2 if alpha == 1 else 1.1
+        colors = {side: COLORS[side] for side in by_side}
+        if marked is not None:
+            colors = dict.fromkeys(by_side, COLORS["quiet"])
+            self._bones = {
+                side: [bone for bone in bones if bone not in marked]
+                for side, bones in by_side.items()
+            }
+        self.shadows = _bone_lines(axis, COLORS["shadow"], 3 * width, 1.0, 1)
+        self.bones = {side: _bone_lines(axis, c, width, alpha, 2) for side, c in colors.items()}
+        if marked is not None:
+            self._bones["departing"] = marked
+            self.bones["departing"] = _bone_lines(axis, COLORS["departure"], 2 * width, alpha, 3)
+        joined = skeleton is not None and skeleton.bones
+        size = 3 * width if joined else 1.5 * width
+        (self.dots,) = axis.plot([], [], "o", color=colors["middle"], alpha=alpha, markersize=size)
+
+    def show(self, bodies, shadows=()):
+        """Move to bodies, each (n_points, 2)."""
         for side, lines in self.bones.items():
-            lines.set_segments([body[list(bone)] for bone in self._bones[side]])
-        if self.head is not None:
-            self.head.set_data(self._head[[now]].T)
+            lines.set_segments(_segments(bodies, self._bones[side]))
+        self.shadows.set_segments(_segments(shadows, self._all))
+        dots = [self._dots_of(body) for body in bodies]
+        self.dots.set_data(np.concatenate(dots).T if dots else ([], []))
+
+    def _dots_of(self, body):
+        """The places of the dots of a body: its head, or all joints if there are no bones."""
+        skeleton = self._skeleton
+        if skeleton is None or not skeleton.bones:
+            return body if skeleton is None else body[: len(skeleton.joints)]
+        if "head" not in skeleton.landmarks:
+            return body[:0]
+        return landmark_track(body[np.newaxis], skeleton, "head")
+
+
+def _bone_lines(axis, color, width, alpha, zorder):
+    """An empty artist for the bones of stick figures."""
+    from matplotlib.collections import LineCollection
+
+    lines = LineCollection([], colors=color, linewidths=width, alpha=alpha, zorder=zorder)
+    lines.set_capstyle("round")
+    return axis.add_collection(lines, autolim=False)
+
+
+def _segments(bodies, bones):
+    """The bones of each body as one line with gaps: matplotlib draws few long lines faster."""
+    if not bones or not len(bodies):
+        return []
+    lines, ends = np.full((len(bodies), len(bones), 3, 2), np.nan), np.array(bones)
+    for line, body in zip(lines, bodies, strict=True):
+        line[:, :2] = body[ends]
+    return list(lines.reshape(len(bodies), -1, 2))

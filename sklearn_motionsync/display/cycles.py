@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
 
 from ..body.formats import SIDES
+from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features
-from ..inputs.types import PerformancesLike, Unit, ValuesLike
+from ..inputs.types import PerformancesLike, Unit
+from ..inputs.wording import counted
 from ..segmentation.cycles import (
     CycleSegmenter,
     as_learnt,
@@ -19,16 +22,16 @@ from ..segmentation.cycles import (
     correlate_takes,
     start_curves,
 )
-from ..segmentation.self_correlation import required_strength
+from ..segmentation.self_correlation import SelfCorrelation, required_strength
 from ..synchronizers.match import UNITS, rates_of
-from .arguments import AxesLike, as_index
-from .drawing import COLORS, WIDTH, legend_above, panels
-from .time_axis import TimeAxis
+from .arguments import as_index, labels_of_signals
+from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, legend_above
 
 __all__ = ["CycleDisplay"]
 
 
-class CycleDisplay:
+@dataclass(eq=False, repr=False)
+class CycleDisplay(Display):
     """The self-correlation of a take, where it repeats, and the cuts between its cycles.
 
     Above the self-correlation of the longest stretch over the lag: its peaks, the period, and the
@@ -36,31 +39,25 @@ class CycleDisplay:
 
     Parameters
     ----------
-    correlation : array-like, shape (n_lags,)
-        The self-correlation at each lag in frames.
-    peaks : array-like of int
-        The lags of its peaks.
-    curve : array-like, shape (n_frames,)
+    repeats : SelfCorrelation
+        The self-correlation, its peaks, and the period of the longest stretch.
+    curve : ndarray, shape (n_frames,)
         A curve of the take.
-    cuts : array-like of int, default=()
+    axis : TimeAxis
+        The time of the take.
+    cuts : ndarray of int
         The frames at which cycles begin and end.
-    stretches : list of (int, int), default=()
+    stretches : list of (int, int)
         The first frames of stretches that repeat, and the frames after their last ones.
-    n_cycles : int, default=None
-        The number of whole cycles; None is one less than there are cuts.
-    threshold : float, default=0.4
+    threshold : float
         The self-correlation that a cyclic take needs.
-    period : float, default=None
-        The length of a cycle in frames; None if there is none.
-    name : str, default=""
-        The name of the curve.
-    reason : str, default=""
-        Why the take cannot be segmented.
+    label : str
+        The label of the curve.
+    title : str
+        What was found.
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
     axes_ : list of Axes
         The panels of the self-correlation and of the take.
     correlation_, curve_, peaks_, threshold_ : Line2D
@@ -83,28 +80,17 @@ class CycleDisplay:
     [99, 202, 306, 410]
     """
 
-    def __init__(
-        self,
-        correlation: ValuesLike,
-        peaks: ValuesLike,
-        curve: ValuesLike,
-        cuts: ValuesLike = (),
-        *,
-        stretches: Sequence[tuple[int, int]] = (),
-        n_cycles: int | None = None,
-        threshold: float = 0.4,
-        period: float | None = None,
-        name: str = "",
-        reason: str = "",
-    ) -> None:
-        self.correlation, self.curve = np.asarray(correlation), np.asarray(curve)
-        self.peaks, self.cuts = np.asarray(peaks, dtype=int), np.asarray(cuts, dtype=int)
-        self.n_cycles = max(len(self.cuts) - 1, 0) if n_cycles is None else n_cycles
-        self.stretches = [(int(start), int(stop)) for start, stop in stretches]
-        self.threshold, self.period, self.name, self.reason = threshold, period, name, reason
+    repeats: SelfCorrelation
+    curve: np.ndarray
+    axis: TimeAxis
+    cuts: np.ndarray
+    stretches: Sequence[tuple[int, int]]
+    threshold: float
+    label: str
+    title: str
 
     def __repr__(self):
-        return f"CycleDisplay({len(self.curve)} frames, {self._describe()})"
+        return f"CycleDisplay({len(self.curve)} frames, {self.title})"
 
     @classmethod
     def from_estimator(
@@ -116,6 +102,9 @@ class CycleDisplay:
         feature: int | str | None = None,
         unit: Unit = "frames",
         frame_rate: float | None = None,
+        ylabel: str | Mapping[str, str] | None = None,
+        units: str | Mapping[str, str] | None = None,
+        xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw the self-correlation and the cuts of a take.
@@ -135,8 +124,13 @@ class CycleDisplay:
             The unit of time; ``"percent"`` is of the take.
         frame_rate : float, default=None
             Frames a second, for seconds; by default what tables tell, as in `Match.to_frame`.
-        ax : Axes, or two of them, default=None
-            A subplot to be divided, or one axes a panel. None makes a figure.
+        ylabel, units : str or dict, default=None
+            The label of the curve and its unit; by default its name, and what tables tell in
+            ``attrs["units"]``.
+        xlabel : str, default=None
+            The label of the time of the take, in place of that of the unit.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
 
         Returns
         -------
@@ -159,93 +153,74 @@ class CycleDisplay:
         row = segmenter.report(recordings[i : i + 1]).iloc[0]
         learnt = estimator if fitted else None
         name, curve = _curve_of(segmenter, learnt, recordings[i], x, feature)
-        cuts, n_cycles = np.array([], dtype=int), None
+        cuts, cycles = np.array([], dtype=int), ""
         if fitted and row["cyclic"]:
             _, origin = estimator.segment(recordings[i : i + 1])
             whole = origin[origin["complete"]]
-            cuts, n_cycles = np.unique([whole["start"], whole["stop"] - 1]), len(whole)
-        period = longest.period if row["period"] > 0 else None
-        display = cls(
-            longest.correlation,
-            longest.peaks,
+            cuts = np.unique([whole["start"], whole["stop"] - 1])
+            cycles = counted(len(whole), "whole cycle")
+        rates = rates_of([recordings[i]], frame_rate, unit)
+        (label,) = labels_of_signals([name], units_of_columns(recordings[i]), ylabel, units)
+        period = f"period {longest.period:.1f} frames" if row["period"] > 0 else ""
+        several = f"{len(row['stretches'])} stretches" if len(row["stretches"]) > 1 else ""
+        found = filter(None, [row["reason"], several, period, cycles])
+        return cls(
+            longest if row["period"] > 0 else longest._replace(period=np.nan),
             curve,
+            TimeAxis(unit, len(curve), [len(curve)], rates, xlabel),
             cuts,
-            stretches=row["stretches"],
-            n_cycles=n_cycles,
-            threshold=float(required_strength(np.inf, longest.breadth, segmenter.threshold)),
-            period=period,
-            name=name,
-            reason=row["reason"],
-        )
-        return display.plot(ax, unit=unit, frame_rate=rates_of([recordings[i]], frame_rate, unit))
+            row["stretches"],
+            float(required_strength(np.inf, longest.breadth, segmenter.threshold)),
+            label,
+            ", ".join(found) or "no period",
+        ).plot(ax)
 
-    def plot(
-        self, ax: AxesLike | None = None, *, unit: Unit = "frames", frame_rate: float | None = None
-    ) -> Self:
-        """Draw.
+    def _layout(self):
+        return [0, 1], (2, 1), (WIDTH, 4.8)
 
-        Parameters
-        ----------
-        ax : Axes, or two of them, default=None
-            A subplot to be divided, or one axes a panel. None makes a figure.
-        unit : {"frames", "percent", "seconds"}, default="frames"
-            The unit of time; ``"percent"`` is of the take.
-        frame_rate : float, default=None
-            Frames a second, for seconds.
-
-        Returns
-        -------
-        CycleDisplay
-            The display itself.
-        """
-        axis = TimeAxis(unit, len(self.curve), [len(self.curve)], frame_rate)
-        (times,) = axis.performances()
-        self.figure_, self.axes_ = panels(ax, [0, 1], 2, 1, (WIDTH, 4.8))
+    def _draw(self):
         upper, lower = self.axes_
-        lags = times[: len(self.correlation)]
+        (times,) = self.axis.trials()
         blue, black, orange = (COLORS[k] for k in ("performance", "pattern", "mean"))
-        (self.correlation_,) = upper.plot(lags, self.correlation, color=blue)
-        at, values = lags[self.peaks], self.correlation[self.peaks]
-        (self.peaks_,) = upper.plot(at, values, "o", color=blue, fillstyle="none", label="peaks")
+        correlation, peaks = self.repeats.correlation, self.repeats.peaks
+        lags = times[: len(correlation)]
+        (self.correlation_,) = upper.plot(lags, correlation, color=blue)
+        (self.peaks_,) = upper.plot(
+            lags[peaks], correlation[peaks], "o", color=blue, fillstyle="none", label="peaks"
+        )
         # The threshold is higher at lags of which a stretch holds less than two.
         longest = max((stop - start for start, stop in self.stretches), default=len(self.curve))
-        cycles = longest / np.arange(1, len(lags))
-        asked = required_strength(cycles, np.inf, self.threshold)
+        asked = required_strength(longest / np.arange(1, len(lags)), np.inf, self.threshold)
         (self.threshold_,) = upper.plot(
             lags[1:], asked, color="0.4", linestyle="--", linewidth=1, label="threshold"
         )
         self.period_ = None
-        if self.period is not None:
-            period = np.interp(self.period, np.arange(len(lags)), lags)
-            self.period_ = upper.axvline(period, color=orange, linewidth=1, label="period")
-        upper.set_xlim(0, times[longest - 1])
-        upper.set_ylim(min(-0.5, self.correlation.min() - 0.05), 1.05)
-        upper.set_xlabel(f"lag ({UNITS[unit]})")
-        upper.set_ylabel("self-correlation")
-        upper.set_title(self._describe(), fontsize="medium")
+        if np.isfinite(self.repeats.period):
+            at = np.interp(self.repeats.period, np.arange(len(lags)), lags)
+            self.period_ = upper.axvline(at, color=orange, linewidth=1, label="period")
+        upper.set_ylim(min(-0.5, correlation.min() - 0.05), 1.05)
+        upper.set_title(self.title, fontsize="medium")
+        lag = f"lag ({UNITS[self.axis.unit]})"
+        self._label_axes([upper], ["self-correlation"], lag, ends=(0, times[longest - 1]))
         (self.curve_,) = lower.plot(times, self.curve, color=blue)
         self.stretches_ = [
-            lower.axvspan(times[start], times[stop - 1], color=orange, alpha=0.15, linewidth=0)
+            lower.axvspan(
+                times[start],
+                times[stop - 1],
+                color=orange,
+                alpha=0.15,
+                linewidth=0,
+                label="repeats",
+            )
             for start, stop in self.stretches
         ]
-        handles, labels = upper.get_legend_handles_labels()
-        if self.stretches_:
-            handles, labels = [*handles, self.stretches_[0]], [*labels, "repeats"]
-        legend_above([upper], handles, labels)
+        handles, _ = upper.get_legend_handles_labels()
+        legend_above([upper], [*handles, *self.stretches_[:1]])
         self.cuts_ = lower.vlines(
             times[self.cuts], 0, 1, transform=lower.get_xaxis_transform(), color=black, linewidth=1
         )
-        lower.set_xlim(0, times[-1])
-        lower.set_xlabel(axis.performance_label.replace("trial", "take"))
-        lower.set_ylabel(self.name)
-        return self
-
-    def _describe(self):
-        n = self.n_cycles
-        cut = f"{n} whole cycle{'s' * (n != 1)}" if len(self.cuts) else ""
-        period = "" if self.period is None else f"period {self.period:.1f} frames"
-        several = f"{len(self.stretches)} stretches" if len(self.stretches) > 1 else ""
-        return ", ".join(filter(None, [self.reason, several, period, cut])) or "no period"
+        time = self.axis.trial_label.replace("trial", "take")
+        self._label_axes([lower], [self.label], time, ends=times)
 
 
 def _curve_of(segmenter, fitted, take, x, feature):

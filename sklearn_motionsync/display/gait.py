@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -12,10 +13,10 @@ from ..body.formats import SIDES
 from ..body.skeleton import Skeleton
 from ..gait.events import events_of, tabulate_events
 from ..gait.recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
-from ..inputs.types import NumbersLike, PerformancesLike, Table, ValuesLike
+from ..inputs.types import PerformancesLike, Table, ValuesLike
 from ..inputs.wording import counted
-from .arguments import AxesLike, as_index
-from .drawing import WIDTH, legend_above, panels
+from .arguments import as_index
+from .base import WIDTH, AxesLike, Display, legend_above
 
 __all__ = ["GaitDisplay"]
 
@@ -24,7 +25,8 @@ _COLORS = {"left": "#D55E00", "right": "#0072B2"}
 _STYLES = {FOOT_STRIKE: "-", FOOT_OFF: ":"}
 
 
-class GaitDisplay:
+@dataclass(eq=False, repr=False)
+class GaitDisplay(Display):
     """Heights of heels and toes of a recording, its foot strikes and foot-offs, and the stances.
 
     Above each foot by itself: the heights of its heel and its toe, with lines at its events. Below
@@ -33,19 +35,19 @@ class GaitDisplay:
 
     Parameters
     ----------
-    times : array-like, shape (n_frames,)
+    times : ndarray, shape (n_frames,)
         Seconds.
-    heights : mapping of str to array-like (n_frames,)
+    heights : mapping of str to ndarray (n_frames,)
         Of ``left_heel``, ``left_toe``, ``right_heel`` and ``right_toe``, as far as they are known.
     events : DataFrame
         ``label``, ``context`` and ``time`` of the events, as from `gait_events`.
     unit : str, default=""
         Of the heights.
+    xlabel : str, default=None
+        The label of the time axis.
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
     axes_ : list of Axes
         A panel for each foot, and that of the stances.
     stances_ : dict of str to list of (float, float)
@@ -60,17 +62,11 @@ class GaitDisplay:
     GaitDisplay(8 strikes, 8 foot-offs)
     """
 
-    def __init__(
-        self,
-        times: ValuesLike,
-        heights: Mapping[str, NumbersLike],
-        events: pd.DataFrame,
-        *,
-        unit: str = "",
-    ) -> None:
-        self.times, self.unit = np.asarray(times), unit
-        self.heights = {name: np.asarray(values) for name, values in heights.items()}
-        self.events = events
+    times: np.ndarray
+    heights: Mapping[str, np.ndarray]
+    events: pd.DataFrame
+    unit: str = ""
+    xlabel: str | None = None
 
     def __repr__(self):
         counts = [int((self.events["label"] == label).sum()) for label in (FOOT_STRIKE, FOOT_OFF)]
@@ -86,6 +82,7 @@ class GaitDisplay:
         recording: int = 0,
         feet: Mapping[str, str | Sequence[str] | None] | None = None,
         frame_rate: float | ValuesLike | None = None,
+        xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw the feet and the events of a recording.
@@ -104,8 +101,10 @@ class GaitDisplay:
             As for `gait_events`.
         frame_rate : float, or array-like of shape (n_recordings,), default=None
             Frames a second; by default what tables tell.
-        ax : Axes, or one for each of the panels, default=None
-            A subplot to be divided, or one axes a panel. None makes a figure.
+        xlabel : str, default=None
+            The label of the time axis, in place of "time (s)".
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
 
         Returns
         -------
@@ -134,25 +133,14 @@ class GaitDisplay:
         heights = {name: values - floor for name, values in heights.items()}
         times = recordings.times_at(i, np.arange(len(rows)))
         table = tabulate_events(recordings, i, walk, events_of_walk)
-        return cls(times, heights, table, unit=unit).plot(ax)
+        return cls(times, heights, table, unit, xlabel).plot(ax)
 
-    def plot(self, ax: AxesLike | None = None) -> Self:
-        """Draw.
+    def _layout(self):
+        count = len(self._sides()) + 1
+        return [(k, 0) for k in range(count)], (count, 1), (WIDTH, 1.2 + 1.5 * count)
 
-        Parameters
-        ----------
-        ax : Axes, or one for each of the panels, default=None
-            A subplot to be divided, or one axes a panel. None makes a figure.
-
-        Returns
-        -------
-        GaitDisplay
-            The display itself.
-        """
-        sides = [side for side in SIDES if f"{side}_heel" in self.heights]
-        cells = [(k, 0) for k in range(len(sides) + 1)]
-        size = (WIDTH, 1.2 + 1.5 * len(cells))
-        self.figure_, self.axes_ = panels(ax, cells, len(cells), 1, size)
+    def _draw(self):
+        sides = self._sides()
         *feet, bars = self.axes_
         self.stances_ = {side: self._stances(side) for side in sides}
         for axis, side in zip(feet, sides, strict=True):
@@ -162,11 +150,13 @@ class GaitDisplay:
         bars.set_yticks(range(len(sides)), list(reversed(sides)))
         bars.set_ylim(-0.6, len(sides) - 0.4)
         bars.set_title("on the ground", fontsize="medium")
-        for axis in self.axes_:
-            axis.set_xlim(self.times[0], self.times[-1])
-        bars.set_xlabel("time (s)")
+        height = f"height ({self.unit})" if self.unit else "height"
+        names = [*[height] * len(sides), "foot"]
+        self._label_axes(self.axes_, names, self.xlabel or "time (s)", ends=self.times)
         self._draw_legend()
-        return self
+
+    def _sides(self):
+        return [side for side in SIDES if f"{side}_heel" in self.heights]
 
     def _times_of(self, side, label):
         rows = (self.events["context"] == CONTEXTS[side]) & (self.events["label"] == label)
@@ -195,7 +185,6 @@ class GaitDisplay:
         for label, style in _STYLES.items():
             for time in self._times_of(side, label):
                 axis.axvline(time, color="black", linestyle=style, linewidth=0.9)
-        axis.set_ylabel(f"height ({self.unit})" if self.unit else "height")
         axis.set_title(f"{side} foot", fontsize="medium")
 
     def _draw_legend(self):
@@ -207,4 +196,4 @@ class GaitDisplay:
             Line2D([], [], color="black", linestyle=style, linewidth=0.9, label=name)
             for name, style in (("strike", "-"), ("foot-off", ":"))
         ]
-        legend_above(self.axes_[:1], handles, [handle.get_label() for handle in handles])
+        legend_above(self.axes_[:1], handles)

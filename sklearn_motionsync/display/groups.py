@@ -1,9 +1,10 @@
-"""GroupDisplay: means of groups with bands, their timing, and where they differ."""
+"""GroupDisplay and NormDisplay: groups, and a subject before a norm, in shape and timing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Self
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
@@ -11,24 +12,34 @@ from sklearn.base import BaseEstimator
 
 from ..comparison.curves import AlignedCurves
 from ..comparison.groups import GroupComparison
+from ..comparison.norm import NormComparison
 from ..comparison.study import GroupsOfPeople, band_of_mean
 from ..inputs.features import choose_features
 from ..inputs.keyframes import Keyframes
-from ..inputs.types import (
-    Features,
-    Labels,
-    NumbersLike,
-    PerformancesLike,
-    Unit,
-    ValuesLike,
-)
+from ..inputs.types import Features, Labels, NumbersLike, PerformancesLike, Unit, ValuesLike
+from ..inputs.wording import counted
 from ..matching.counting import first_largest
 from ..synchronizers.match import check_coverage
-from .arguments import AxesLike, labels_of_signals
-from .drawing import GroupCurves, empty_lists, group_styles, legend_above, signal_panels
-from .time_axis import TimeAxis, clock_rate, draw_keyframes, offset_label, text_of_keyframe
+from .arguments import labels_of_signals
+from .base import (
+    COLORS,
+    AxesLike,
+    Display,
+    TimeAxis,
+    clock_rate,
+    curves,
+    draw_keyframes,
+    empty_lists,
+    front_line,
+    group_styles,
+    legend_above,
+    offset_label,
+    parts_outside,
+    signal_layout,
+    text_of_keyframe,
+)
 
-__all__ = ["GroupDisplay", "display_of_groups"]
+__all__ = ["GroupCurves", "GroupDisplay", "NormDisplay", "display_of_groups"]
 
 # Signals that are shown when none are named; of more, the first few.
 _MOST = 6
@@ -43,10 +54,56 @@ _STATISTICS = {
 _BAR, _BESIDE = 0.015, 0.014
 
 
-class GroupDisplay:
+class GroupCurves(NamedTuple):
+    """The mean, the band and the performances of a group in each panel.
+
+    Attributes
+    ----------
+    mean, lower, upper : ndarray, shape (P, n_panels)
+        The bounds are NaN without a band.
+    performances : ndarray (n, P, n_panels), or None
+    label : str
+        The entry of the legend.
+    color, line : str
+        The colour and the line style of the mean.
+    """
+
+    mean: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    performances: np.ndarray | None
+    label: str
+    color: str
+    line: str
+
+    def draw_performances(self, axis, clock, i):
+        """Draw the performances in panel i."""
+        behind = self.performances[:, :, i]
+        return curves(
+            axis, [clock] * len(behind), behind, colors=self.color, linewidths=0.7, alpha=0.5
+        )
+
+    def draw_band(self, axis, clock, i):
+        """Draw the band of panel i in the pale colour of the group."""
+        bounds = self.lower[:, i], self.upper[:, i]
+        for bound in bounds:
+            axis.plot(clock, bound, color=self.color, linewidth=0.5)
+        return axis.fill_between(clock, *bounds, color=self.color, alpha=0.18, linewidth=0)
+
+    def draw_mean(self, axis, clock, i):
+        """Draw the mean in panel i."""
+        return front_line(
+            axis, clock, self.mean[:, i], color=self.color, linewidth=2, linestyle=self.line
+        )
+
+
+@dataclass(eq=False, repr=False)
+class GroupDisplay(Display):
     """Means of groups with bands, the timing of their people, and where they differ.
 
-    A panel for each signal, and one of the offsets, with a dot a person. Use `from_estimator`.
+    A panel for each signal, and one of the offsets, with a dot a person. Offsets are counted from
+    the mean offset of all trials, so a group at 0 is as early and as late as all of them together.
+    Use `from_estimator`.
 
     Parameters
     ----------
@@ -54,7 +111,7 @@ class GroupDisplay:
         For each group the mean and the band of its people, of the signals and of their offsets at
         last; and its trials, if they are drawn.
     offsets : list of ndarray, shape (n_people_k, P)
-        For each group the offsets of its people, in the unit of time.
+        For each group the offsets of its people from the mean of all trials, in the unit of time.
     axis : TimeAxis
         The clock of the template.
     ylabels : list of str
@@ -72,8 +129,6 @@ class GroupDisplay:
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
     axes_ : list of Axes
         One a signal, then that of the offsets.
     means_ : list of list of Line2D
@@ -105,22 +160,15 @@ class GroupDisplay:
     ['A: 12 trials of 4 people', 'B: 12 trials of 4 people']
     """
 
-    def __init__(
-        self,
-        groups: Sequence[GroupCurves],
-        offsets: Sequence[NumbersLike],
-        axis: TimeAxis,
-        *,
-        ylabels: Sequence[str],
-        feature_names: Sequence[str],
-        title: str = "",
-        events: pd.DataFrame | None = None,
-        comparison: GroupComparison | None = None,
-        pairs: bool = False,
-    ) -> None:
-        self.groups, self.offsets, self.axis = groups, list(map(np.asarray, offsets)), axis
-        self.ylabels, self.feature_names, self.title = ylabels, feature_names, title
-        self.events, self.comparison, self.pairs = events, comparison, pairs
+    groups: Sequence[GroupCurves]
+    offsets: Sequence[np.ndarray]
+    axis: TimeAxis
+    ylabels: Sequence[str]
+    feature_names: Sequence[str]
+    title: str = ""
+    events: pd.DataFrame | None = None
+    comparison: GroupComparison | None = None
+    pairs: bool = False
 
     def __repr__(self):
         return f"GroupDisplay({[group.label for group in self.groups]}, {self.feature_names})"
@@ -183,11 +231,9 @@ class GroupDisplay:
             of people. The columns of a table are their names. By default ``keyframes``. The panel
             of offsets has its dots there; without events, where timing differs most: at the peak of
             a cluster, or where offsets of people vary most.
-        ylabel : str, list of str or dict, default=None
-            Labels of the signals in place of their names: one each, or by name.
-        units : str, list of str or dict, default=None
-            Units of the signals for their labels: of all, one each, or by name. By default what
-            tables tell in ``attrs["units"]``.
+        ylabel, units : str, list of str or dict, default=None
+            Labels of the signals and their units: of all, one each, or by name. By default their
+            names, and what tables tell in ``attrs["units"]``.
         unit : {"frames", "percent", "seconds"}, default="percent"
             Unit of time, as in `compare_groups`.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
@@ -249,24 +295,13 @@ class GroupDisplay:
         )
         return display.plot(ax)
 
-    def plot(self, ax: AxesLike | None = None) -> Self:
-        """Draw.
-
-        Parameters
-        ----------
-        ax : Axes or array-like of Axes, default=None
-            One of a figure's subplots is divided into the panels; or one axes a signal and one for
-            the offsets. None makes a figure.
-
-        Returns
-        -------
-        GroupDisplay
-            The display itself.
-        """
+    def _layout(self):
         more = 0.6 + 0.2 * max(len(self.groups) - 2, 0) + 0.5 * (self.events is not None)
-        self.figure_, self.axes_, top = signal_panels(ax, len(self.ylabels), more)
+        return signal_layout(len(self.ylabels), more)
+
+    def _draw(self):
         *above, timing = self.axes_
-        clock, unit = self.axis.clock, self.axis.unit
+        clock = self.axis.clock
         self.trials_ = []
         if self.groups[0].performances is not None:
             self.trials_ = [
@@ -278,10 +313,8 @@ class GroupDisplay:
             self.bands_.append([group.draw_band(axis, clock, i) for group in self.groups])
             self.means_.append([group.draw_mean(axis, clock, i) for group in self.groups])
         timing.axhline(0, color="0.6", linewidth=0.8, zorder=0)
-        for axis, label in zip(self.axes_, [*self.ylabels, offset_label(unit)], strict=True):
-            axis.set_ylabel(label)
-            axis.set_xlim(clock[0], clock[-1])
-        timing.set_xlabel(self.axis.label)
+        ylabels = [*self.ylabels, offset_label(self.axis.unit)]
+        self._label_axes(self.axes_, ylabels, self.axis.label, ends=clock)
         self.dots_, self.clusters_, self.events_ = empty_lists(3)
         if self.events is not None:
             self._draw_events()
@@ -291,8 +324,7 @@ class GroupDisplay:
         if self.comparison is not None and (bars := self._draw_clusters()):
             handles.append(bars[0])
             labels.append(f"differs, p at most {self.comparison.level:g}")
-        legend_above(above, handles, labels, self.title, below=top, n_cols=1)
-        return self
+        legend_above(above, handles, labels, self.title, below=above[:2], n_cols=1)
 
     def _draw_events(self):
         """Draw the mean place of each event, and its spread between people, in all panels."""
@@ -323,8 +355,17 @@ class GroupDisplay:
             x, y = np.reshape(xs, shape), np.reshape(ys, shape)
             axis.plot(x, y, color="0.6", linewidth=0.6, zorder=4)
         for x, y, group in zip(xs, ys, self.groups, strict=True):
-            style = {"s": 12, "color": group.color, "edgecolor": "white", "linewidth": 0.4}
-            self.dots_.append(axis.scatter(x.ravel(), y.ravel(), zorder=5, **style))
+            self.dots_.append(
+                axis.scatter(
+                    x.ravel(),
+                    y.ravel(),
+                    zorder=5,
+                    s=12,
+                    color=group.color,
+                    edgecolor="white",
+                    linewidth=0.4,
+                )
+            )
 
     def _moments(self):
         """The frames of the clock at which offsets are shown person by person."""
@@ -393,13 +434,15 @@ def display_of_groups(
     default = dict(zip(aligned.names, aligned.units, strict=True))
     ylabels = labels_of_signals(names, default, ylabel, units)
     of_people = GroupsOfPeople.of(groups, people, n)
-    offsets, shown = of_people.means(aligned.offsets), aligned.curves[:, :, chosen]
+    # From the mean of all trials.
+    offsets = of_people.means(aligned.offsets - aligned.offsets.mean(axis=0))
+    shown = aligned.curves[:, :, chosen]
     whom = "trials" if people is None else "people"
     title = _STATISTICS[statistic].format(whom=whom, share=100 * coverage)
     of_groups = []
-    for label, (name, (color, line)), maker, signals, offset in zip(
+    for label, (color, line), maker, signals, offset in zip(
         of_people.describe(people is not None),
-        group_styles(of_people.labels).items(),
+        group_styles(of_people.labels).values(),
         of_people.makers,
         of_people.means(shown),
         offsets,
@@ -408,9 +451,7 @@ def display_of_groups(
         panels = np.concatenate([signals, offset[:, :, np.newaxis]], axis=2)
         mean, half = band_of_mean(panels, statistic, coverage)
         drawn = shown[maker.any(axis=0)] if trials else None
-        of_groups.append(
-            GroupCurves(mean, mean - half, mean + half, drawn, label, name, color, line)
-        )
+        of_groups.append(GroupCurves(mean, mean - half, mean + half, drawn, label, color, line))
     return GroupDisplay(
         of_groups,
         offsets,
@@ -442,3 +483,165 @@ def _events_on_clock(events, aligned, of_people):
     names = events.columns if isinstance(events, pd.DataFrame) else range(places.shape[1])
     rows = of_people.means(places)
     return pd.DataFrame(np.concatenate(rows), columns=pd.Index(names, tupleize_cols=False))
+
+
+@dataclass(eq=False, repr=False)
+class NormDisplay(Display):
+    """A subject before a norm: a panel for each signal, and one of the offset.
+
+    The subject is the strongest line, violet where it departs. The offset is counted from the mean
+    offset of the norm, which is flat. Use `from_comparison`.
+
+    Parameters
+    ----------
+    comparison : NormComparison
+        From `compare_to_norm`.
+    subject : label
+        One of ``comparison.verdicts.index``.
+    signals : list of int
+        The signals that are drawn, by index.
+    labels : list of str
+        Their labels.
+    xlabel : str, default=None
+        The label of the time axis.
+
+    Attributes
+    ----------
+    axes_ : list of Axes
+        One a signal, then that of the offset.
+    subject_, mean_ : list of Line2D
+        The subject and the mean of the norm, one a panel.
+    bands_ : list of FillBetweenPolyCollection
+        The limits of the norm, one a panel.
+    spread_ : list of FillBetweenPolyCollection
+        One standard deviation of the norm, one a panel.
+    departures_ : list of LineCollection
+        The parts of the subject outside the limits, one a panel.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+    >>> from sklearn_motionsync.display import NormDisplay
+    >>> from sklearn_motionsync.datasets import make_gait
+    >>> gait = make_gait(16, timing=6, random_state=0)
+    >>> sync = DenseSynchronizer(n_frames=101).fit(gait.data)
+    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", people=gait.person)
+    >>> display = NormDisplay.from_comparison(found, "person1", features=[0, 1], units="degrees")
+    >>> len(display.axes_)
+    3
+    """
+
+    comparison: NormComparison
+    subject: Hashable
+    signals: Sequence[int]
+    labels: Sequence[str]
+    xlabel: str | None = None
+
+    def __repr__(self):
+        return f"NormDisplay({self.comparison.describe(self.subject)!r})"
+
+    @classmethod
+    def from_comparison(
+        cls,
+        comparison: NormComparison,
+        subject: Hashable,
+        *,
+        features: Features | None = None,
+        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
+        units: str | Sequence[str] | Mapping[str, str] | None = None,
+        xlabel: str | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
+        """Draw a subject of a comparison.
+
+        Parameters
+        ----------
+        comparison : NormComparison
+            From `compare_to_norm`.
+        subject : label
+            One of ``comparison.verdicts.index``.
+        features : int, str or list of them, default=None
+            Signals that are drawn, by index or name. By default those with a departure and the
+            first ones, four in all. The offset is always drawn.
+        ylabel, units : str, list of str or dict, default=None
+            Labels of the signals and their units: of all, one each, or by name. By default their
+            names, and what tables tell in ``attrs["units"]``.
+        xlabel : str, default=None
+            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+
+        Returns
+        -------
+        NormDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If there is no such subject or feature, or labels or units do not fit the signals.
+
+        See Also
+        --------
+        sklearn_motionsync.compare_to_norm : Makes the comparison.
+        """
+        if not isinstance(comparison, NormComparison):
+            raise ValueError(f"Give what compare_to_norm returns, got {type(comparison).__name__}.")
+        subjects = comparison.verdicts.index.to_list()
+        if subject not in subjects:
+            raise ValueError(f"There is no subject {subject!r}; there are {subjects[:8]}.")
+        signals = comparison.features[:-1]
+        if features is None:
+            table = comparison.departures
+            is_departure = (table["subject"] == subject) & (table["what"] == "shape")
+            departing = map(signals.index, table[is_departure]["feature"])
+            order = list(dict.fromkeys([*departing, *range(len(signals))]))
+            chosen = sorted(order[: len(choose_features(None, signals))])
+        else:
+            chosen = choose_features(features, signals)
+        names = [signals[k] for k in chosen]
+        known_units = dict(zip(comparison.features, comparison.units, strict=True))
+        labels = labels_of_signals(names, known_units, ylabel, units)
+        return cls(comparison, subject, chosen, labels, xlabel).plot(ax)
+
+    def _layout(self):
+        return signal_layout(len(self.signals), 1.0)
+
+    def _draw(self):
+        norm = self.comparison
+        subject = norm.verdicts.index.get_loc(self.subject)
+        axis_of_time = TimeAxis.of_clock(norm.unit, norm.clock, self.xlabel)
+        self.subject_, self.mean_, self.bands_, self.spread_, self.departures_ = empty_lists(5)
+        clock, grey, violet = norm.clock, COLORS["envelope"], COLORS["departure"]
+        for axis, k in zip(self.axes_, [*self.signals, -1], strict=True):
+            # The offset is the last of the signals, and counted from the mean of the norm.
+            zero = norm.mean[:, k] if k == -1 else 0
+            mean, std, curve = norm.mean[:, k] - zero, norm.std[:, k], norm.curves[subject, :, k]
+            curve, reach = curve - zero, norm.limits[subject, k] * std
+            for half, alpha, areas in ((reach, 0.3, self.bands_), (std, 0.5, self.spread_)):
+                areas.append(
+                    axis.fill_between(
+                        clock, mean - half, mean + half, color=grey, alpha=alpha, linewidth=0
+                    )
+                )
+            self.mean_.extend(axis.plot(clock, mean, color="0.3", linewidth=1, linestyle="--"))
+            line = front_line(axis, clock, curve, color=COLORS["performance"], linewidth=2.4)
+            self.subject_.append(line)
+            xs, ys = parts_outside(curve[np.newaxis], mean - reach, mean + reach)
+            xs = axis_of_time.convert(xs)
+            lines = curves(axis, xs, ys, colors=violet, linewidths=2.8, zorder=5)
+            self.departures_.append(lines)
+        ylabels = [*self.labels, offset_label(norm.unit)]
+        self._label_axes(self.axes_, ylabels, axis_of_time.label, ends=clock)
+        handles = [self.subject_[0], (self.spread_[0], self.mean_[0]), self.bands_[0]]
+        n_trials = int(norm.verdicts["n_trials"].iloc[subject])
+        labels = [
+            f"{self.subject}: {counted(n_trials, 'trial')}",
+            f"norm: mean and standard deviation of {norm.n_people} people",
+            f"{100 * (1 - norm.level):.3g} % of new people stay inside in all panels",
+        ]
+        if any(len(lines.get_segments()) for lines in self.departures_):
+            handles.insert(1, self.departures_[0])
+            labels.insert(1, "departs")
+        title, above = norm.describe(self.subject), self.axes_[:-1]
+        legend_above(above, handles, labels, title, below=above[:2], n_cols=1)

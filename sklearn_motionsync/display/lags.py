@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -13,9 +14,7 @@ from ..synchronizers.lags import Lags
 from ..synchronizers.match import rates_of
 from ..synchronizers.parts import PartSynchronizer
 from ..utils.pipelines import route_to_synchronizer
-from .arguments import AxesLike
-from .drawing import COLORS, WIDTH, curves, front_line, legend_above, panels
-from .time_axis import TimeAxis
+from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, curves, front_line, legend_above
 
 __all__ = ["LagDisplay"]
 
@@ -24,7 +23,8 @@ _UNITS = {"frames": "frames", "percent": "% of the time", "seconds": "s"}
 _CURVES_A_ROW = 3
 
 
-class LagDisplay:
+@dataclass(eq=False, repr=False)
+class LagDisplay(Display):
     """A map of lags, part by time, above the curves of the parts with their spread.
 
     The map shows the mean lag. It is hatched where the 95 % confidence interval of the mean
@@ -40,12 +40,8 @@ class LagDisplay:
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
-    map_ax_ : Axes
-        The panel of the map.
     axes_ : list of Axes
-        The panels of the curves, one a part.
+        The panel of the map, then those of the curves, one a part.
     map_ : QuadMesh
         The mean lags.
     unsure_ : list of PolyCollection
@@ -56,7 +52,7 @@ class LagDisplay:
         The confidence interval of each part.
     spreads_ : list of LineCollection
         The standard deviation of each part.
-    colorbar_ : Colorbar or None
+    colorbar_ : Colorbar
         The scale of the map.
 
     Examples
@@ -71,8 +67,8 @@ class LagDisplay:
     LagDisplay(5 parts behind the rest of the body, 6 trials of 4 people)
     """
 
-    def __init__(self, lags: Lags, *, xlabel: str | None = None) -> None:
-        self.lags, self.xlabel = lags, xlabel
+    lags: Lags
+    xlabel: str | None = None
 
     def __repr__(self):
         return f"LagDisplay({self._describe()})"
@@ -88,7 +84,6 @@ class LagDisplay:
         frame_rate: float | ValuesLike | None = None,
         xlabel: str | None = None,
         ax: AxesLike | None = None,
-        colorbar: bool = True,
         **params: Any,
     ) -> Self:
         """Draw the lags of performances.
@@ -108,10 +103,8 @@ class LagDisplay:
             `Match.to_frame`.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
-        ax : Axes, or one for the map and one for each part, default=None
-            A subplot to be divided, or one axes a panel. None makes a figure.
-        colorbar : bool, default=True
-            Whether to draw a scale of the map.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
         **params : dict
             Further arguments of the steps before the synchronizer. Key-frames are of the whole
             body, and lags do not depend on them.
@@ -131,7 +124,7 @@ class LagDisplay:
             unit=unit,
             frame_rate=rates_of(X, frame_rate, unit),
         )
-        return cls(lags, xlabel=xlabel).plot(ax, colorbar=colorbar)
+        return cls(lags, xlabel=xlabel).plot(ax)
 
     @classmethod
     def from_predictions(
@@ -140,7 +133,6 @@ class LagDisplay:
         *,
         xlabel: str | None = None,
         ax: AxesLike | None = None,
-        colorbar: bool = True,
     ) -> Self:
         """Draw lags that are known already.
 
@@ -150,10 +142,8 @@ class LagDisplay:
             The result of `PartSynchronizer.lags`.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
-        ax : Axes, or one for the map and one for each part, default=None
-            A subplot to be divided, or one axes a panel. None makes a figure.
-        colorbar : bool, default=True
-            Whether to draw a scale of the map.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
 
         Returns
         -------
@@ -169,44 +159,31 @@ class LagDisplay:
             raise ValueError(
                 f"lags must be the result of PartSynchronizer.lags; got {type(lags).__name__}."
             )
-        return cls(lags, xlabel=xlabel).plot(ax, colorbar=colorbar)
+        return cls(lags, xlabel=xlabel).plot(ax)
 
-    def plot(self, ax: AxesLike | None = None, *, colorbar: bool = True) -> Self:
-        """Draw.
-
-        Parameters
-        ----------
-        ax : Axes, or one for the map and one for each part, default=None
-            A subplot to be divided, or one axes a panel. None makes a figure.
-        colorbar : bool, default=True
-            Whether to draw a scale of the map.
-
-        Returns
-        -------
-        LagDisplay
-            The display itself.
-        """
-        n_parts, n_frames = self.lags.values.shape[1:]
+    def _layout(self):
+        n_parts = self.lags.values.shape[1]
         n_cols = min(n_parts, _CURVES_A_ROW)
-        n_rows = -(-n_parts // n_cols)
+        n_rows = 2 - (-n_parts // n_cols)
         # The map is as high as two rows of curves.
         curves_at = ((2 + i // n_cols, i % n_cols) for i in range(n_parts))
         cells = [(slice(0, 2), slice(None)), *curves_at]
-        size = (WIDTH, 0.6 + 1.6 * (2 + n_rows))
-        self.figure_, (self.map_ax_, *self.axes_) = panels(ax, cells, 2 + n_rows, n_cols, size)
+        return cells, (n_rows, n_cols), (WIDTH, 0.6 + 1.6 * n_rows)
+
+    def _draw(self):
+        n_parts, n_frames = self.lags.values.shape[1:]
         unit = "frames" if self.lags.unit == "frames" else "percent"
-        axis = TimeAxis(unit, n_frames, label=self.xlabel)
-        table = self.lags.over_time()
+        axis, table = TimeAxis(unit, n_frames, label=self.xlabel), self.lags.over_time()
         columns = {
             name: table[name].to_numpy().reshape(n_parts, n_frames)
             for name in ("mean", "sd", "low", "high")
         }
-        self._draw_map(axis, columns, colorbar)
-        self._draw_curves(axis, columns)
-        return self
+        top, *below = self.axes_
+        self._draw_map(top, axis, columns)
+        self._draw_curves(below, axis, columns)
 
-    def _draw_map(self, axis, columns, colorbar):
-        mean, top = columns["mean"], self.map_ax_
+    def _draw_map(self, top, axis, columns):
+        mean = columns["mean"]
         largest = np.abs(mean).max() or 1.0
         self.map_ = top.pcolormesh(
             axis.clock,
@@ -240,18 +217,16 @@ class LagDisplay:
         top.set_xlabel(axis.label)
         top.set_title(self._describe(), fontsize="small")
         top.grid(False)
-        self.colorbar_ = None
-        if colorbar:
-            self.colorbar_ = self.figure_.colorbar(
-                self.map_, ax=top, location="top", aspect=40, pad=0.02
-            )
-            self.colorbar_.set_label(f"mean lag ({_UNITS[self.lags.unit]})", fontsize="small")
+        self.colorbar_ = self.figure_.colorbar(
+            self.map_, ax=top, location="top", aspect=40, pad=0.02
+        )
+        self.colorbar_.set_label(f"mean lag ({_UNITS[self.lags.unit]})", fontsize="small")
 
-    def _draw_curves(self, axis, columns):
+    def _draw_curves(self, panels, axis, columns):
         self.means_, self.intervals_, self.spreads_ = [], [], []
         mean, sd = columns["mean"], np.nan_to_num(columns["sd"])
         reach = 1.05 * max((np.abs(mean) + sd).max(), 1e-9)
-        for i, ax in enumerate(self.axes_):
+        for i, ax in enumerate(panels):
             ax.axhline(0, color="0.3", linewidth=0.8)
             low, high, grey = columns["low"][i], columns["high"][i], COLORS["envelope"]
             interval = ax.fill_between(axis.clock, low, high, color=grey, alpha=0.6, linewidth=0)
@@ -273,12 +248,7 @@ class LagDisplay:
                 ax.set_ylabel(f"late by\n({_UNITS[self.lags.unit]})", fontsize="small")
         units = "trials" if self.lags.groups is None else "people"
         handles = [self.means_[0], self.intervals_[0], self.spreads_[0]]
-        labels = [
-            "mean",
-            f"95 % interval ({units})",
-            "± 1 SD of trials",
-        ]
-        legend_above(self.axes_, handles, labels)
+        legend_above(panels, handles, ["mean", f"95 % interval ({units})", "± 1 SD of trials"])
 
     def _names(self):
         """Names of the parts, with their repeatability (ICC) where it is known."""

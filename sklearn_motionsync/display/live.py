@@ -2,40 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from textwrap import fill
-from typing import Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
 
 from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
+from ..inputs.collections import as_collection
+from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.types import (
-    Features,
-    Indexed,
-    PerformancesLike,
-    ValuesLike,
-)
+from ..inputs.types import Features, Indexed, PerformancesLike, ValuesLike
 from ..inputs.wording import counted
 from ..matching.counting import first_largest
 from ..online.stream import Course, LivePhase, each_value
 from ..online.synchronizer import OnlineSynchronizer
 from ..utils.pipelines import find_step
-from .animation import animate
+from .animation import MovingDisplay
 from .arguments import (
     TIME_LABELS,
-    Animation,
-    AxesLike,
-    Takes,
     as_index,
-    as_indices,
     as_names,
+    as_performances,
+    labels_as_text,
+    labels_of_signals,
     times_from_zero,
 )
-from .bodies import BodyPanel, invert_postures
-from .drawing import COLORS, WIDTH, front_line, legend_above, panels
+from .base import COLORS, WIDTH, AxesLike, front_line, legend_above
+from .bodies import BodyPanel, bounds, invert_postures, project, stage
 
 __all__ = ["PhaseDisplay"]
 
@@ -55,14 +52,14 @@ _INTERVAL_OPACITY = 0.25
 _N_CYCLES = 5
 # The number of points of a prediction.
 _N_POINTS = 60
-# Inner and outer radius of the ring and of the arc around it; the radius of the numbers, and the
-# inner radius of the hand.
-_RING, _ARC, _NUMBERS, _HAND = (0.78, 1.0), (1.05, 1.13), 1.28, 0.62
+# Inner and outer radius of the ring and of the arc around it, and the radius of the numbers.
+_RING, _ARC, _NUMBERS = (0.78, 1.0), (1.05, 1.13), 1.28
 # The opacity of the ring at confidence 0.
 _MIN_OPACITY = 0.12
 
 
-class PhaseDisplay:
+@dataclass(eq=False, repr=False)
+class PhaseDisplay(MovingDisplay):
     """Running performances: their phase, its confidence, and a prediction.
 
     Panels for each performance: a dial of its phase, with an arc that ends at the phase after a
@@ -79,16 +76,16 @@ class PhaseDisplay:
     performances : list of RunningPerformance
         The performances with their phases.
     features : list of str, default=()
-        The names of the features.
+        The labels of the features.
     skeleton : Skeleton, default=None
         The skeleton of the bodies.
     unit : {"frames", "seconds"}, default="frames"
         The unit of the times.
+    xlabel : str, default=None
+        The label of time axes, in place of that of the unit.
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
     axes_ : list of Axes
         Row by row: a body if there are bodies, the dial, the phase, and one a feature.
     rows_ : list
@@ -111,17 +108,12 @@ class PhaseDisplay:
     (PhaseDisplay(2 performances), 6)
     """
 
-    def __init__(
-        self,
-        action: LearntAction,
-        performances: Sequence[RunningPerformance],
-        *,
-        features: Sequence[str] = (),
-        skeleton: Skeleton | None = None,
-        unit: Literal["frames", "seconds"] = "frames",
-    ) -> None:
-        self.action, self.performances = action, performances
-        self.features, self.skeleton, self.unit = features, skeleton, unit
+    action: LearntAction
+    performances: Sequence[RunningPerformance]
+    features: Sequence[str] = ()
+    skeleton: Skeleton | None = None
+    unit: Literal["frames", "seconds"] = "frames"
+    xlabel: str | None = None
 
     def __repr__(self):
         return f"PhaseDisplay({counted(len(self.performances), 'performance')})"
@@ -132,12 +124,14 @@ class PhaseDisplay:
         estimator: BaseEstimator,
         X: PerformancesLike,
         *,
-        times: Indexed[ValuesLike] | None = None,
-        performances: int | Sequence[int] | None = None,
+        times: Indexed[ValuesLike] | ValuesLike | None = None,
         features: Features | None = None,
         training: PerformancesLike | None = None,
         body: BaseEstimator | None = None,
         names: Sequence[str] | None = None,
+        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
+        units: str | Sequence[str] | Mapping[str, str] | None = None,
+        xlabel: str | None = None,
         frame: int | None = None,
         ax: AxesLike | None = None,
         azimuth: float = -60,
@@ -148,12 +142,10 @@ class PhaseDisplay:
         ----------
         estimator : OnlineSynchronizer
             Fitted. The performances that it follows live are not affected.
-        X : performances
-            As ``estimator.track`` takes them; or one, array (n_frames, n_features).
+        X : list of arrays (n_frames_i, n_features), or one of them
+            Performances; of more than four the first four are drawn.
         times : list of array-like (n_frames_i,), default=None
             As ``estimator.track`` takes them; of one performance an array.
-        performances : int or list of int, default=None
-            The indices of the performances that are drawn; by default the first four.
         features : int, str or list of them, default=None
             By index or name; by default the one that varies most in the mean performance.
         training : performances, default=None
@@ -163,13 +155,17 @@ class PhaseDisplay:
             drawn, without the limbs that have a NaN cosine. In a pipeline one NaN hides the body.
         names : list of str, default=None
             The names of the performances that are drawn; by default their labels in X, or numbers.
+        ylabel, units : str, list of str or dict, default=None
+            Labels of the features and their units: of all, one each, or by name. By default their
+            names, and what tables tell in ``attrs["units"]``.
+        xlabel : str, default=None
+            The label of time axes, in place of that of the unit.
         frame : int, default=None
-            A frame of the longest performance; the others are drawn at the same time. By default
-            the last.
+            As in `plot`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         azimuth : float, default=-60
-            The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
+            As in `plot`.
 
         Returns
         -------
@@ -179,24 +175,23 @@ class PhaseDisplay:
         Raises
         ------
         ValueError
-            As from ``estimator.track``; or if there is no such performance, feature or frame.
+            As from ``estimator.track``; or if there is no such feature or frame.
         """
         if not isinstance(estimator, OnlineSynchronizer):
             raise ValueError(
                 f"estimator must be an OnlineSynchronizer, got {type(estimator).__name__}."
             )
         live = estimator
-        takes = Takes(live, X)
-        if performances is None:
-            performances = range(min(_N_PERFORMANCES, len(takes.arrays)))
-        chosen = as_indices(performances, len(takes.arrays), "performances")
-        if names is None:
-            names = [takes.labels[i] for i in chosen]
-        names = as_names(names, len(chosen), "names", "performances")
+        is_single, performances = as_collection(X) is None, list(as_performances(X))
+        performances = performances[:_N_PERFORMANCES]
+        names = labels_as_text(performances) if names is None else names
+        names = as_names(names, len(performances), "names", "performances")
+        stamps = None
         if times is not None:
-            times = takes.select_times(times, chosen)
-        phases = live.track(takes.select(chosen), times)
-        seen = [np.asarray(takes.arrays[i], dtype=np.float64) for i in chosen]
+            listed: Any = [times] if is_single else times
+            stamps = listed[:_N_PERFORMANCES]
+        phases = live.track(performances, stamps)
+        seen = [np.asarray(x, dtype=np.float64) for x in performances]
         feature_names = names_of_features(body, live, live.mean_.shape[1])
         if features is None:
             features = [first_largest(live.mean_.var(axis=0))]
@@ -218,22 +213,25 @@ class PhaseDisplay:
             RunningPerformance.of(
                 action,
                 phase,
-                times_from_zero(times[k], len(x)) if times else np.arange(len(x)) / rate,
+                np.arange(len(x)) / rate if stamps is None else times_from_zero(stamps[k], len(x)),
                 name=names[k],
                 seen=x[:, shown],
                 afterwards=None
                 if live.cyclic or np.isnan(x).any()
-                else _final_phases(live, takes.select([i]), len(x)),
+                else _final_phases(live, performances[k]),
                 body=bodies[k],
             )
-            for k, (i, x, phase) in enumerate(zip(chosen, seen, phases, strict=True))
+            for k, (x, phase) in enumerate(zip(seen, phases, strict=True))
         ]
+        known_units = units_of_columns(performances[0])
+        labels = [feature_names[k] for k in shown]
         display = cls(
             action,
             running,
-            features=[feature_names[k] for k in shown],
+            features=labels_of_signals(labels, known_units, ylabel, units),
             skeleton=skeleton,
             unit="frames" if live.frame_rate is None else "seconds",
+            xlabel=xlabel,
         )
         return display.plot(ax, frame=frame, azimuth=azimuth)
 
@@ -245,9 +243,9 @@ class PhaseDisplay:
         *,
         duration: float | None = None,
         cyclic: bool = False,
+        xlabel: str | None = None,
         frame: int | None = None,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
     ) -> Self:
         """Draw phases that are known already, such as ``live.history``.
 
@@ -262,13 +260,12 @@ class PhaseDisplay:
             The mean duration of the action in frames; None predicts nothing.
         cyclic : bool, default=False
             Whether the phases are those of cycles. The time axis then shows the last few of them.
+        xlabel : str, default=None
+            The label of time axes, in place of "time (frames)".
         frame : int, default=None
-            A frame of the longest performance; the others are drawn at the same time. By default
-            the last.
+            As in `plot`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        azimuth : float, default=-60
-            The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
 
         Returns
         -------
@@ -285,7 +282,7 @@ class PhaseDisplay:
             RunningPerformance.of(action, phase, np.arange(float(len(phase.phase))), name=str(k))
             for k, phase in enumerate(_as_list_of_phases(phases))
         ]
-        return cls(action, running).plot(ax, frame=frame, azimuth=azimuth)
+        return cls(action, running, xlabel=xlabel).plot(ax, frame=frame)
 
     def plot(
         self, ax: AxesLike | None = None, *, frame: int | None = None, azimuth: float = -60
@@ -309,72 +306,43 @@ class PhaseDisplay:
             The display itself.
         """
         longest = max((p.times for p in self.performances), key=lambda times: times[-1])
-        if frame is None:
-            frame = len(longest) - 1
-        frame = as_index(frame, len(longest), "frame")
-        has_body = self.performances[0].body is not None
+        last = len(longest) - 1
+        self._time = longest[last if frame is None else as_index(frame, last + 1, "frame")]
+        self._azimuth = azimuth
+        return super().plot(ax)
+
+    def _has_bodies(self):
+        return self.performances[0].body is not None
+
+    def _layout(self):
         # Two panels beside each other; an odd last one has the whole width.
-        n_panels, count = has_body + 2 + len(self.features), len(self.performances)
-        places: list[tuple] = [divmod(i, 2) for i in range(n_panels)]
+        n_panels, count = self._has_bodies() + 2 + len(self.features), len(self.performances)
+        places = [divmod(i, 2) for i in range(n_panels)]
         if n_panels % 2:
             places[-1] = (n_panels // 2, slice(None))
         each = -(-n_panels // 2)
         cells = [(each * k + row, column) for k in range(count) for row, column in places]
-        size, before = (WIDTH, count * each * _ROW + 0.3), getattr(self, "axes_", ())
-        self.figure_, self.axes_ = panels(ax, cells, count * each, 2, size, before)
+        return cells, (count * each, 2), (WIDTH, count * each * _ROW + 0.3)
+
+    def _draw(self):
         end = max(self.action.end_of(p) for p in self.performances)
-        by_row = np.array(self.axes_, dtype=object).reshape(count, -1)
-        self.rows_ = [
-            PerformanceRow(
-                axes, p, self.action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth
-            )
-            for axes, p in zip(by_row, self.performances, strict=True)
-        ]
+        by_row = np.array(self.axes_, dtype=object).reshape(len(self.performances), -1)
+        curves_from = self._has_bodies() + 1
+        self.rows_ = []
         for axes, p in zip(by_row, self.performances, strict=True):
+            row = PerformanceRow(axes, p, self.action, self.skeleton, self.features, self._azimuth)
+            self.rows_.append(row)
             axes[0].set_title(fill(p.name, _LINE_LENGTH), fontsize="medium", parse_math=False)
-        for axis in by_row[:, has_body + 1 :].flat:
-            axis.set_xlabel(TIME_LABELS[self.unit])
-        self._show(longest[frame])
+            for axis in axes[curves_from:]:
+                axis.set_xlim(0, 1.02 * end or 1.0)
+                axis.set_xlabel(self.xlabel or TIME_LABELS[self.unit])
+            row.show(self._time)
         # One legend for all curves.
-        for axis in by_row[0, has_body + 1 : has_body + 3]:
-            handles, labels = axis.get_legend_handles_labels()
-            legend_above([axis], handles, labels, n_cols=2)
-        return self
+        for axis in by_row[0, curves_from : curves_from + 2]:
+            legend_above([axis], *axis.get_legend_handles_labels(), n_cols=2)
 
-    def animate(
-        self,
-        ax: AxesLike | None = None,
-        *,
-        seconds: float = 5.0,
-        fps: int = 15,
-        azimuth: float = -60,
-    ) -> Animation:
-        """Animate the performances.
-
-        Parameters
-        ----------
-        ax : Axes or array-like of Axes, default=None
-            As for `plot`; by default the axes of the last plot.
-        seconds : float, default=5.0
-            The time until the longest performance ends.
-        fps : int, default=15
-            Pictures a second.
-        azimuth : float, default=-60
-            The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
-
-        Returns
-        -------
-        Animation
-            A notebook plays it as the last value of a cell; ``to_jshtml()`` gives the HTML,
-            ``save(path)`` a GIF or a video, for which Matplotlib draws the whole figure picture by
-            picture.
-        """
-        longest = max(p.times[-1] for p in self.performances)
-        view = {"seconds": seconds, "fps": fps, "azimuth": azimuth}
-        return animate(self, lambda k, last: self._show(longest * k / last), ax, **view)
-
-    def _show(self, time):
-        """Move all rows to a time."""
+    def _show(self, share):
+        time = share * max(p.times[-1] for p in self.performances)
         for row in self.rows_:
             row.show(time)
 
@@ -397,19 +365,18 @@ def _as_list_of_phases(phases) -> list[LivePhase]:
     return listed
 
 
-def _final_phases(live, X, n_frames):
-    """The phases of the frames of one performance as they are known at its end."""
-    (tau,) = live.synchronizer_.match(X).times
+def _final_phases(live, x):
+    """The phases of the frames of a performance as they are known at its end."""
+    (tau,) = live.synchronizer_.match([x]).times
     clock = np.arange(live.n_frames_)
     # Where tau is constant, all phases in between are equally right.
-    return np.interp(np.linspace(0, clock[-1], n_frames), tau + 1e-9 * clock, clock)
+    return np.interp(np.linspace(0, clock[-1], len(x)), tau + 1e-9 * clock, clock)
 
 
 def _spread(live, training):
     """The standard deviation (P, n_features) of the training performances from their mean."""
     match = live.synchronizer_.match(training)
-    warped = match.warp(Takes(live, training).arrays)
-    return np.asarray(warped).reshape(len(warped), *live.mean_.shape).std(axis=0)
+    return np.asarray(match.warp(training)).reshape(-1, *live.mean_.shape).std(axis=0)
 
 
 # -- what is drawn -----------------------------------------------------------------------
@@ -528,26 +495,29 @@ class PerformanceRow:
     skeleton : Skeleton or None
         The skeleton of the bodies.
     features : list of str
-        The names of the curves.
-    end : float
-        The end of the time axis.
+        The labels of the curves.
     azimuth : float
     """
 
-    def __init__(self, axes, performance, action, skeleton, features, end, azimuth):
+    def __init__(self, axes, performance, action, skeleton, features, azimuth):
         self.axes, self._performance, self._action = list(axes), performance, action
         axes, self.body = list(axes), None
         if performance.body is not None:
-            self.body = BodyPanel(axes.pop(0), performance, action, skeleton, azimuth)
+            self._bodies, self._mean = (
+                project(x, skeleton, azimuth) for x in (performance.body, action.body)
+            )
+            places = [x.reshape(-1, 2) for x in (self._bodies, self._mean)]
+            stage(axes[0], "", *bounds(np.concatenate(places)))
+            self.body = BodyPanel(axes.pop(0), skeleton)
         self.dial = PhaseDial(axes.pop(0))
         self._time_axes = axes
-        self._draw_phase(axes[0], end)
+        self._draw_phase(axes[0])
         self.curves = [
-            FeaturePanel(axis, performance, action, k, name, end)
+            FeaturePanel(axis, performance, action, k, name)
             for k, (axis, name) in enumerate(zip(axes[1:], features, strict=True))
         ]
 
-    def _draw_phase(self, axis, end):
+    def _draw_phase(self, axis):
         grey, blue, orange = (COLORS[k] for k in ("shadow", "performance", "mean"))
         self.confidence = _empty_area(axis, grey, 0.75, "confidence")
         self.afterwards = None
@@ -555,13 +525,18 @@ class PerformanceRow:
         label = _label("90 % band", performance.lower)
         self.interval = _empty_area(axis, blue, _INTERVAL_OPACITY, label)
         if performance.afterwards is not None:
-            style = {"color": COLORS["pattern"], "linewidth": 0.9, "linestyle": "--"}
             ys = percent * performance.afterwards
-            (self.afterwards,) = axis.plot(performance.times, ys, label="afterwards", **style)
+            (self.afterwards,) = axis.plot(
+                performance.times,
+                ys,
+                label="afterwards",
+                color=COLORS["pattern"],
+                linewidth=0.9,
+                linestyle="--",
+            )
         label = _label("predicted", self._action.duration)
         (self.rest,) = axis.plot([], [], color=orange, linestyle=":", label=label)
         self.phase = front_line(axis, [], [], color=blue, label="phase")
-        axis.set_xlim(0, end)
         axis.set_ylim(0, 105)
         axis.set_ylabel("phase (%)")
         # Ticks need not be drawn again with the areas over them.
@@ -591,7 +566,8 @@ class PerformanceRow:
                 axis.set_xlim(max(0, stop - _N_CYCLES * action.duration), stop)
         self.rest.set_data(rest[0], 100 / last * rest[1])
         if self.body is not None:
-            self.body.show(now, ahead % last if action.cyclic else ahead)
+            ahead = ahead % last if action.cyclic else ahead
+            self.body.show([self._bodies[now]], [action.interpolate(ahead, self._mean)])
         for curve in self.curves:
             curve.show(now, *rest)
 
@@ -609,8 +585,6 @@ class PhaseDial:
         From 0 to the phase; the opacity shows the confidence.
     ahead : Wedge
         From the phase to the phase ahead.
-    hand : Line2D
-        The line width shows the confidence.
     share, state : Text
         The phase in per cent; rate and confidence.
     """
@@ -623,33 +597,23 @@ class PhaseDial:
         axis.set_ylim(-1.75, 1.45)
         axis.axis("off")
 
-        def ring(color, radii, zorder, end=90):
-            wedge = Wedge(
-                (0, 0),
-                radii[1],
-                end,
-                90,
-                width=radii[1] - radii[0],
-                facecolor=color,
-                linewidth=0,
-                zorder=zorder,
+        def ring(color, inner, outer, end):
+            return axis.add_patch(
+                Wedge((0, 0), outer, end, 90, width=outer - inner, facecolor=color, linewidth=0)
             )
-            return axis.add_patch(wedge)
 
-        ring(COLORS["shadow"], _RING, 1, end=-270)
-        self.passed = ring(COLORS["performance"], _RING, 2)
-        self.ahead = ring(COLORS["mean"], _ARC, 3)
-        (self.hand,) = axis.plot([], [], color=COLORS["pattern"], solid_capstyle="round", zorder=4)
+        ring(COLORS["shadow"], *_RING, end=-270)
+        self.passed = ring(COLORS["performance"], *_RING, end=90)
+        self.ahead = ring(COLORS["mean"], *_ARC, end=90)
         for quarter, text in enumerate(("0 %", "25", "50", "75")):
-            x, y = _on_circle(quarter / 4, _NUMBERS + 0.02 * (quarter % 2))
-            axis.text(
-                x, y, text, ha="center", va="center", color="0.35", fontsize="x-small", zorder=1
-            )
-        self.share = axis.text(0, 0, "", ha="center", va="center", fontsize="large")
-        self.state = axis.text(0, -1.62, "", ha="center", va="center", fontsize="small")
+            angle, radius = np.pi * quarter / 2, _NUMBERS + 0.02 * (quarter % 2)
+            x, y = radius * np.sin(angle), radius * np.cos(angle)
+            axis.text(x, y, text, color="0.35", fontsize="x-small", ha="center", va="center")
+        self.share = axis.text(0, 0, "", fontsize="large", ha="center", va="center")
+        self.state = axis.text(0, -1.62, "", fontsize="small", ha="center", va="center")
 
     def show(self, share, ahead, rate, confidence, cycle=None):
-        """Move the hand to a share of the action, or of the cycle of this number."""
+        """Move to a share of the action, or of the cycle of this number."""
         # Rounding may take a sum of probabilities above 1.
         confidence = min(confidence, 1)
         self.passed.set_theta1(90 - 360 * share)
@@ -658,45 +622,38 @@ class PhaseDial:
         self.ahead.set_theta2(90 - 360 * share)
         # A wedge of no length would be drawn as a whole ring.
         self.ahead.set_visible(ahead > share)
-        self.hand.set_data(*np.transpose([_on_circle(share, _HAND), _on_circle(share, _RING[1])]))
-        self.hand.set_linewidth(1 + 4 * confidence)
         self.share.set_text(f"{100 * share:.0f} %")
         number = "" if cycle is None else f"cycle {cycle:.0f}, "
         self.state.set_text(f"{number}rate {rate:.1f}, confidence {confidence:.2f}")
 
 
-def _on_circle(share, radius):
-    """The point at a share of a circle, clockwise from the top."""
-    angle = 2 * np.pi * share
-    return radius * np.sin(angle), radius * np.cos(angle)
-
-
 class FeaturePanel:
     """A feature as it was observed, and its prediction."""
 
-    def __init__(self, axis, performance, action, k, name, end):
+    def __init__(self, axis, performance, action, k, name):
         self._times, self._seen = performance.times, performance.seen[:, k]
         self._action, self._k = action, k
         blue, orange = COLORS["performance"], COLORS["mean"]
         self.band = _empty_area(axis, COLORS["envelope"], 0.35, _label("90 % band", action.spread))
-        style = {"color": blue, "linewidth": 1, "linestyle": "--", "alpha": 0.6}
-        (self.to_come,) = axis.plot(self._times, self._seen, label="what came", **style)
-        style = {"color": orange, "linewidth": 2, "label": _label("predicted", action.mean)}
-        (self.expected,) = axis.plot([], [], **style)
+        (self.to_come,) = axis.plot(
+            self._times,
+            self._seen,
+            label="what came",
+            color=blue,
+            linewidth=1,
+            linestyle="--",
+            alpha=0.6,
+        )
+        (self.expected,) = axis.plot([], [], color=orange, linewidth=2, label="predicted")
         self.seen = front_line(axis, [], [], color=blue, label="seen")
         (self.now,) = axis.plot([], [], "o", color=blue, markersize=5, zorder=5)
-        values = [self._seen]
-        if action.mean is not None:
-            mean, half_width = action.mean[:, k], 0
-            if action.spread is not None:
-                half_width = _BAND * action.spread[:, k]
-            values += [mean - half_width, mean + half_width]
-        values = np.concatenate(values)
-        values = values[np.isfinite(values)]
-        low, high = (values.min(), values.max()) if len(values) else (0.0, 0.0)
+        mean, half_width = action.mean[:, k], 0
+        if action.spread is not None:
+            half_width = _BAND * action.spread[:, k]
+        values = np.concatenate([self._seen, mean - half_width, mean + half_width])
+        low, high = np.nanmin(values), np.nanmax(values)
         margin = 0.06 * (high - low) or 1.0
         axis.set_ylim(low - margin, high + margin)
-        axis.set_xlim(0, end)
         axis.set_ylabel(fill(name, _LINE_LENGTH))
 
     def show(self, now, times, phases):
@@ -704,14 +661,11 @@ class FeaturePanel:
         past = slice(now + 1)
         self.seen.set_data(self._times[past], self._seen[past])
         self.now.set_data([self._times[now]], [self._seen[now]])
-        mean, spread = (
-            None if x is None else self._action.interpolate(phases, x[:, self._k])
-            for x in (self._action.mean, self._action.spread)
-        )
-        if mean is not None:
-            self.expected.set_data(times, mean)
-        if spread is not None:
-            _fill_area(self.band, times, mean - _BAND * spread, mean + _BAND * spread)
+        mean = self._action.interpolate(phases, self._action.mean[:, self._k])
+        self.expected.set_data(times, mean)
+        if self._action.spread is not None:
+            half_width = _BAND * self._action.interpolate(phases, self._action.spread[:, self._k])
+            _fill_area(self.band, times, mean - half_width, mean + half_width)
 
 
 def _label(text, value):

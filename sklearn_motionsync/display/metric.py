@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -10,12 +11,11 @@ from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.types import Features, ValuesLike
+from ..inputs.types import Features
 from ..inputs.wording import counted
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
-from .arguments import AxesLike
-from .drawing import COLORS, WIDTH, legend_above, panels
+from .base import COLORS, WIDTH, AxesLike, Display, legend_above
 
 __all__ = ["MetricDisplay"]
 
@@ -23,7 +23,8 @@ __all__ = ["MetricDisplay"]
 _MAX_ROWS = 20
 
 
-class MetricDisplay:
+@dataclass(eq=False, repr=False)
+class MetricDisplay(Display):
     """The weight of each feature in the learnt metric, beside its share of the plain velocities.
 
     A feature with a short dark bar and a long light one moves much and says little about time: it
@@ -31,22 +32,20 @@ class MetricDisplay:
 
     Parameters
     ----------
-    share : array-like, shape (n_shown,)
+    share : ndarray, shape (n_shown,)
         The share of each feature, or of several together, in the learnt metric; about 0, or
         slightly below, for noise.
-    energy : array-like, shape (n_shown,)
+    energy : ndarray, shape (n_shown,)
         Its share in the velocities, which are compared without a metric.
     feature_names : list of str
         One name a row.
-    n_performances : int, default=None
-        The number of performances from which the metric was learnt, for the title.
+    n_performances : int
+        The number of performances from which the metric was learnt.
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
-    ax_ : Axes
-        The axes of the last plot.
+    axes_ : list of Axes
+        The panel.
     share_, energy_ : BarContainer
         Dark and light bars, from the top.
 
@@ -66,16 +65,10 @@ class MetricDisplay:
     (True, True)
     """
 
-    def __init__(
-        self,
-        share: ValuesLike,
-        energy: ValuesLike,
-        *,
-        feature_names: Sequence[str],
-        n_performances: int | None = None,
-    ) -> None:
-        self.share, self.energy = np.asarray(share), np.asarray(energy)
-        self.feature_names, self.n_performances = feature_names, n_performances
+    share: np.ndarray
+    energy: np.ndarray
+    feature_names: Sequence[str]
+    n_performances: int
 
     def __repr__(self):
         return f"MetricDisplay({counted(len(self.feature_names), 'row')}, {self._describe()})"
@@ -99,7 +92,7 @@ class MetricDisplay:
             aSpace. By default all, in the order of the larger of the two shares; of more than 20
             the smallest are summed in one row.
         ax : Axes, default=None
-            Axes to draw on. None makes a figure.
+            See `plot`.
 
         Returns
         -------
@@ -123,53 +116,40 @@ class MetricDisplay:
         else:
             chosen = choose_features(features, names)
             names, shares = [names[i] for i in chosen], shares[chosen]
-        display = cls(*shares.T, feature_names=names, n_performances=len(metric.performances))
-        return display.plot(ax)
+        share, energy = shares.T
+        return cls(share, energy, names, len(metric.performances)).plot(ax)
 
-    def plot(self, ax: AxesLike | None = None) -> Self:
-        """Draw.
+    def _layout(self):
+        return [(0, 0)], (1, 1), (WIDTH, max(2.2, 0.27 * len(self.share) + 1.3))
 
-        Parameters
-        ----------
-        ax : Axes, default=None
-            Axes to draw on. None makes a figure.
-
-        Returns
-        -------
-        MetricDisplay
-            The display itself.
-        """
+    def _draw(self):
+        (axis,) = self.axes_
         rows = np.arange(len(self.share))
-        size = (WIDTH, max(2.2, 0.27 * len(rows) + 1.3))
-        self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, size)
-        self.energy_ = self.ax_.barh(
+        self.energy_ = axis.barh(
             rows,
             self.energy,
+            label="without weights",
             height=0.8,
             color=COLORS["envelope"],
             alpha=0.6,
-            label="without weights",
         )
         # Narrower and in front: both bars are visible, whichever is longer.
-        self.share_ = self.ax_.barh(
+        self.share_ = axis.barh(
             rows,
             self.share,
+            label="with the learnt weights",
             height=0.4,
             color=COLORS["performance"],
-            label="with the learnt weights",
         )
-        self.ax_.axvline(0, color="0.3", linewidth=0.8)
-        self.ax_.set_yticks(rows, self.feature_names)
-        self.ax_.set_ylim(len(rows) - 0.4, -0.6)
-        self.ax_.set_xlabel("share of what is compared (0 to 1)")
-        self.ax_.set_title(self._describe(), fontsize="medium")
-        legend_above([self.ax_], *self.ax_.get_legend_handles_labels())
-        self.ax_.grid(False, axis="y")
-        return self
+        axis.axvline(0, color="0.3", linewidth=0.8)
+        axis.set_yticks(rows, self.feature_names)
+        axis.set_ylim(len(rows) - 0.4, -0.6)
+        self._label_axes([axis], ["feature"], "share of what is compared (0 to 1)")
+        axis.set_title(self._describe(), fontsize="medium")
+        legend_above([axis], [self.energy_, self.share_])
+        axis.grid(False, axis="y")
 
     def _describe(self):
-        if self.n_performances is None:
-            return "learnt metric"
         return f"metric learnt from {counted(self.n_performances, 'trial')}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -13,8 +14,8 @@ from ..inputs.tables import labels_of
 from ..inputs.types import PerformanceLike, PerformancesLike
 from ..inputs.wording import counted
 from ..segmentation.search import find_performances
-from .arguments import AxesLike, as_performances
-from .drawing import COLORS, WIDTH, legend_above, panels
+from .arguments import as_performances
+from .base import COLORS, WIDTH, AxesLike, Display, legend_above
 
 __all__ = ["SearchDisplay"]
 
@@ -24,7 +25,8 @@ _BOTTOM, _STRIP = 0.3, 0.06
 _MAX_PANELS = 12
 
 
-class SearchDisplay:
+@dataclass(eq=False, repr=False)
+class SearchDisplay(Display):
     """The hits of a search along takes: their times, scores, and the threshold.
 
     Use `from_estimator`, or `from_predictions` with the result of `find_performances`.
@@ -35,13 +37,13 @@ class SearchDisplay:
         ``take``, ``start``, ``stop``, ``score`` and ``threshold`` of the hits.
     lengths : dict
         The number of frames of each take, by its label: one panel each.
-    segments : DataFrame or list of (take, start, stop), default=None
-        True segments of the action.
+    segments : DataFrame, default=None
+        ``take``, ``start`` and ``stop`` of the true segments of the action.
+    xlabel : str, default=None
+        The label of the time of the takes.
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
     axes_ : list of Axes
         The panels, one a take.
     hits_ : list of PatchCollection
@@ -59,16 +61,10 @@ class SearchDisplay:
     SearchDisplay(1 hit in 1 take)
     """
 
-    def __init__(
-        self,
-        origin: pd.DataFrame,
-        lengths: Mapping[Any, int],
-        *,
-        segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
-    ) -> None:
-        self.origin, self.lengths, self.segments = origin, dict(lengths), None
-        if segments is not None:
-            self.segments = pd.DataFrame(segments, columns=["take", "start", "stop"])
+    origin: pd.DataFrame
+    lengths: Mapping[Any, int]
+    segments: pd.DataFrame | None = None
+    xlabel: str | None = None
 
     def __repr__(self):
         count, takes = int(self._accepted().sum()), len(self.lengths)
@@ -81,6 +77,7 @@ class SearchDisplay:
         X: PerformancesLike,
         *,
         segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
+        xlabel: str | None = None,
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
@@ -94,8 +91,10 @@ class SearchDisplay:
             The takes of `find_performances`.
         segments : DataFrame or list of (take, start, stop), default=None
             True segments of the action, by the labels of the takes.
-        ax : Axes, or one for each take, default=None
-            A subplot to be divided, or one axes a take. None makes a figure.
+        xlabel : str, default=None
+            The label of the time of the takes, in place of "frame of the take".
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
         **params : dict
             Arguments of `find_performances`, without ``threshold``: the figure shows the hits
             above and below the automatic one.
@@ -106,7 +105,7 @@ class SearchDisplay:
             The display, drawn.
         """
         _, origin = find_performances(pattern, X, threshold=None, **params)
-        return cls.from_predictions(origin, X, segments=segments, ax=ax)
+        return cls.from_predictions(origin, X, segments=segments, xlabel=xlabel, ax=ax)
 
     @classmethod
     def from_predictions(
@@ -115,6 +114,7 @@ class SearchDisplay:
         X: PerformancesLike,
         *,
         segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
+        xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw the result of `find_performances`.
@@ -127,8 +127,10 @@ class SearchDisplay:
             The takes that were searched.
         segments : DataFrame or list of (take, start, stop), default=None
             True segments of the action, by the labels of the takes.
-        ax : Axes, or one for each take, default=None
-            A subplot to be divided, or one axes a take. None makes a figure.
+        xlabel : str, default=None
+            The label of the time of the takes, in place of "frame of the take".
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
 
         Returns
         -------
@@ -142,35 +144,29 @@ class SearchDisplay:
         """
         takes = as_performances(X)
         lengths = dict(zip(labels_of(takes)[0], map(len, takes), strict=True))
-        display = cls(origin, lengths, segments=segments)
-        for name, table in (("origin", display.origin), ("segments", display.segments)):
+        true = None
+        if segments is not None:
+            true = pd.DataFrame(segments, columns=["take", "start", "stop"])
+        for name, table in (("origin", origin), ("segments", true)):
             unknown = [] if table is None else [t for t in table["take"] if t not in lengths]
             if unknown:
                 raise ValueError(
                     f"{name} names the take {unknown[0]!r}; the takes are {list(lengths)[:8]}."
                 )
-        return display.plot(ax)
+        return cls(origin, lengths, true, xlabel).plot(ax)
 
-    def plot(self, ax: AxesLike | None = None) -> Self:
-        """Draw.
+    def _shown(self):
+        return list(self.lengths)[:_MAX_PANELS]
 
-        Parameters
-        ----------
-        ax : Axes, or one for each take, default=None
-            A subplot to be divided, or one axes a take. None makes a figure.
+    def _layout(self):
+        count = len(self._shown())
+        return [(i, 0) for i in range(count)], (count, 1), (WIDTH, 1.1 + 1.3 * count)
 
-        Returns
-        -------
-        SearchDisplay
-            The display itself.
-        """
+    def _draw(self):
         from matplotlib.collections import PatchCollection
         from matplotlib.patches import Rectangle
 
-        shown = list(self.lengths)[:_MAX_PANELS]
-        cells = [(i, 0) for i in range(len(shown))]
-        size = (WIDTH, 1.1 + 1.3 * len(shown))
-        self.figure_, self.axes_ = panels(ax, cells, len(shown), 1, size)
+        shown = self._shown()
         accepted, self.hits_ = self._accepted(), []
         for axis, take in zip(self.axes_, shown, strict=True):
             in_take = (self.origin["take"] == take).to_numpy()
@@ -189,12 +185,11 @@ class SearchDisplay:
                 axis.axhline(level, color=COLORS["mean"], linestyle="--", linewidth=1)
             axis.set_xlim(0, self.lengths[take])
             axis.set_ylim(_BOTTOM - _STRIP * (self.segments is not None), 1)
-            axis.set_ylabel("score (1: alike)")
             title = f"take {take}" if len(self.lengths) > 1 else ""
             axis.set_title(title, fontsize="medium")
-        self.axes_[-1].set_xlabel("frame of the take")
+        time = self.xlabel or "frame of the take"
+        self._label_axes(self.axes_, ["score (1: alike)"] * len(shown), time)
         self._draw_legend()
-        return self
 
     def _accepted(self):
         return (self.origin["score"] >= self.origin["threshold"]).to_numpy(dtype=bool)
@@ -219,4 +214,4 @@ class SearchDisplay:
         ]
         if self.segments is not None:
             handles.append(Patch(facecolor=COLORS["pattern"], label="known to be there"))
-        legend_above(self.axes_[:1], handles, [handle.get_label() for handle in handles])
+        legend_above(self.axes_[:1], handles)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from numbers import Real
 from textwrap import fill
 from typing import Any, Self
@@ -23,25 +24,23 @@ from ..utils.pipelines import (
     index_of_pattern,
     route_to_synchronizer,
 )
-from .animation import animate
+from .animation import MovingDisplay
 from .arguments import (
-    Animation,
-    AxesLike,
     as_frames,
     as_indices,
     as_names,
     as_performances,
     labels_as_text,
 )
+from .base import COLORS, WIDTH, AxesLike, empty_lists
 from .bodies import (
-    bones_by_side,
+    BodyPanel,
     bounds,
-    landmark_track,
     place_on_floor,
     project,
     read_positions,
+    stage,
 )
-from .drawing import COLORS, WIDTH, bone_lines, empty_lists, panels, stage
 from .limb_departures import draw_departures, split_at_synchronizer
 
 __all__ = ["SkeletonDisplay", "postures_at"]
@@ -56,7 +55,8 @@ _SPACING = 0.7
 _N_PERFORMANCES = 6
 
 
-class SkeletonDisplay:
+@dataclass(eq=False, repr=False)
+class SkeletonDisplay(MovingDisplay):
     """Stick figures of joint positions: postures side by side, or performances in motion.
 
     Make one with `from_positions` (postures), `from_model` (Fig. 4), `from_departures` (departures
@@ -94,8 +94,6 @@ class SkeletonDisplay:
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
     axes_ : list of Axes
         The panels.
     bones_ : list of dict
@@ -120,21 +118,14 @@ class SkeletonDisplay:
     5
     """
 
-    def __init__(
-        self,
-        scenes: Sequence[Sequence[np.ndarray]],
-        skeleton: Skeleton | None,
-        titles: Sequence[str],
-        *,
-        durations: Sequence[Sequence[float]] | None = None,
-        labels: Sequence[str] | None = None,
-        marked: Sequence[Sequence[tuple[int, int]]] | None = None,
-        behind: Sequence[Sequence[np.ndarray]] | None = None,
-        heading: str | None = None,
-    ) -> None:
-        self.scenes, self.skeleton, self.titles = scenes, skeleton, titles
-        self.durations, self.labels, self.heading = durations, labels, heading
-        self.marked, self.behind = marked, behind
+    scenes: Sequence[Sequence[np.ndarray]]
+    skeleton: Skeleton | None
+    titles: Sequence[str]
+    durations: Sequence[Sequence[float]] | None = None
+    labels: Sequence[str] | None = None
+    marked: Sequence[Sequence[tuple[int, int]]] | None = None
+    behind: Sequence[Sequence[np.ndarray]] | None = None
+    heading: str | None = None
 
     def __repr__(self):
         return f"SkeletonDisplay({len(self.scenes)} panels)"
@@ -147,7 +138,6 @@ class SkeletonDisplay:
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
-        at: float = 0.0,
         azimuth: float = -60,
     ) -> Self:
         """Draw postures of one performance, or of synchronised ones over each other.
@@ -162,8 +152,6 @@ class SkeletonDisplay:
         frames : int or list of int, default=6
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
-            See `plot`.
-        at : float in [0, 1], default=0.0
             See `plot`.
         azimuth : float, default=-60
             See `plot`.
@@ -180,7 +168,7 @@ class SkeletonDisplay:
         shown = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in shown]
         display = cls(postures_at(shown, bodies), skeleton, titles)
-        return display.plot(ax, at=at, azimuth=azimuth)
+        return display.plot(ax, azimuth=azimuth)
 
     @classmethod
     def from_performances(
@@ -296,7 +284,6 @@ class SkeletonDisplay:
         n_samples: int = 12,
         random_state: RandomState = None,
         ax: AxesLike | None = None,
-        at: float = 0.0,
         azimuth: float = -60,
     ) -> Self:
         """Draw mean postures of a model, and random postures that it accepts (Fig. 4).
@@ -313,8 +300,6 @@ class SkeletonDisplay:
         random_state : int, RandomState instance or None, default=None
             Determines the random postures; None draws others each time.
         ax : Axes or array-like of Axes, default=None
-            See `plot`.
-        at : float in [0, 1], default=0.0
             See `plot`.
         azimuth : float, default=-60
             See `plot`.
@@ -355,7 +340,7 @@ class SkeletonDisplay:
                 f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
-        return cls(scenes, skeleton, titles).plot(ax, at=at, azimuth=azimuth)
+        return cls(scenes, skeleton, titles).plot(ax, azimuth=azimuth)
 
     @classmethod
     def from_departures(
@@ -368,7 +353,6 @@ class SkeletonDisplay:
         limit: float | None = None,
         reference: PerformancesLike | None = None,
         ax: AxesLike | None = None,
-        at: float = 0.0,
         azimuth: float = -60,
         **params: Any,
     ) -> Self:
@@ -404,8 +388,6 @@ class SkeletonDisplay:
             One to five right performances of the same person, as for `find_departures`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        at : float in [0, 1], default=0.0
-            The moment that is drawn, as in `plot`.
         azimuth : float, default=-60
             The direction of view in degrees, as in `plot`.
         **params : dict
@@ -438,7 +420,7 @@ class SkeletonDisplay:
             reference=reference,
         )
         display = cls(scenes, skeleton, titles, marked=marked, behind=behind, heading=heading)
-        return display.plot(ax, at=at, azimuth=azimuth)
+        return display.plot(ax, azimuth=azimuth)
 
     def plot(self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float = -60) -> Self:
         """Draw.
@@ -461,26 +443,34 @@ class SkeletonDisplay:
         """
         if not 0 <= at <= 1:
             raise ValueError(f"at must be a share of the time from 0 to 1, got {at!r}.")
-        drawn, behind = (
+        self._at = at
+        self._drawn, self._behind = (
             [[project(x, self.skeleton, azimuth) for x in scene] for scene in scenes]
             for scenes in (self.scenes, self.behind or [[] for _ in self.scenes])
         )
-        places = None
+        self._gap = 0.0
         if self.labels is not None:
-            gap = _SPACING * max(np.nanmax(x[..., 1]) - np.nanmin(x[..., 1]) for x in drawn[0])
-            places = gap * np.arange(len(self.labels))
-            drawn, behind = (
-                [[x + [gap * i, 0] for i, x in enumerate(scene)] for scene in scenes]
-                for scenes in (drawn, behind)
+            tallest = max(np.nanmax(x[..., 1]) - np.nanmin(x[..., 1]) for x in self._drawn[0])
+            self._gap = _SPACING * tallest
+            self._drawn, self._behind = (
+                [[x + [self._gap * i, 0] for i, x in enumerate(scene)] for scene in scenes]
+                for scenes in (self._drawn, self._behind)
             )
-        n_cols = 1
+        places = [x.reshape(-1, 2) for scene in self._drawn + self._behind for x in scene]
+        self._corners = bounds(np.concatenate(places))
+        super().plot(ax)
+        self.heading_ = None
+        if ax is None and self.heading is not None:
+            lines = [fill(line, _LINE_LENGTH) for line in self.heading.splitlines()]
+            self.heading_ = self.figure_.suptitle("\n".join(lines), fontsize="medium")
+        return self
+
+    def _layout(self):
+        count, n_cols = len(self.scenes), 1
         if self.labels is None:
-            n_cols = -(-len(drawn) // -(-len(drawn) // _PANELS_A_ROW))
-        n_rows = -(-len(drawn) // n_cols)
-        low, high = bounds(
-            np.concatenate([x.reshape(-1, 2) for scene in drawn + behind for x in scene])
-        )
-        width, height = high - low
+            n_cols = -(-count // -(-count // _PANELS_A_ROW))
+        n_rows = -(-count // n_cols)
+        width, height = np.subtract(*self._corners[::-1])
         # All panels have one scale.
         scale = min(
             (WIDTH - 0.15 * n_cols) / (1.1 * n_cols * width), (2.6 if n_rows == 1 else 2) / height
@@ -490,92 +480,27 @@ class SkeletonDisplay:
         size = max(size[0], min(WIDTH, 1.5 * n_cols)), size[1]
         if self.labels is not None or self.heading is not None:
             size = WIDTH, size[1] + _HEADING * (self.heading is not None)
-        cells = [divmod(i, n_cols) for i in range(len(drawn))]
-        before = getattr(self, "axes_", ())
-        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size, before)
-        self.heading_ = None
-        if ax is None and self.heading is not None:
-            lines = [fill(line, _LINE_LENGTH) for line in self.heading.splitlines()]
-            self.heading_ = self.figure_.suptitle("\n".join(lines), fontsize="medium")
-        self._drawn, self._behind, self._bones = drawn, behind, self._bones_of_panels()
-        self.bones_, self.heads_, self.behind_, self.moments_ = empty_lists(4)
-        for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
-            self._prepare(axis, len(scene))
-            if at > 0:
-                title = f"{title}, at {100 * at:.0f} % of the time"
-            stage(axis, title, low, high)
+        return [divmod(i, n_cols) for i in range(count)], (n_rows, n_cols), size
+
+    def _draw(self):
+        self._bodies, self.moments_ = empty_lists(2)
+        marked = self.marked or [None] * len(self.scenes)
+        for axis, title, scene, bones in zip(
+            self.axes_, self.titles, self._drawn, marked, strict=True
+        ):
+            alpha = 1.0 if self.labels is not None or len(scene) == 1 else 0.45
+            self._bodies.append(BodyPanel(axis, self.skeleton, marked=bones, alpha=alpha))
+            if self._at > 0:
+                title = f"{title}, at {100 * self._at:.0f} % of the time"
+            stage(axis, title, *self._corners)
             if max(map(len, scene), default=0) > 1:
                 self.moments_.append(_time_line(axis))
-            if places is not None:
-                axis.set_xticks(places, self.labels)
-        self._show(at)
-        return self
-
-    def animate(
-        self,
-        ax: AxesLike | None = None,
-        *,
-        seconds: float = 5.0,
-        fps: int = 15,
-        azimuth: float = -60,
-    ) -> Animation:
-        """Animate the performances.
-
-        Parameters
-        ----------
-        ax : Axes or array-like of Axes, default=None
-            As for `plot`; by default the axes of the last plot.
-        seconds : float, default=5.0
-            The time until the longest performance ends.
-        fps : int, default=15
-            Pictures a second; each takes 10 to 50 kB of a notebook.
-        azimuth : float, default=-60
-            The direction of the viewer in degrees, as in `plot`.
-
-        Returns
-        -------
-        Animation
-            A notebook plays it as the last value of a cell; ``to_jshtml()`` gives the HTML,
-            ``save(path)`` a GIF or a video, for which Matplotlib draws the whole figure picture by
-            picture. `write_player` is the fast way to moving bodies, and its file is smaller.
-        """
-        return animate(
-            self,
-            lambda k, last: self._show(k / last),
-            ax,
-            seconds=seconds,
-            fps=fps,
-            azimuth=azimuth,
-        )
-
-    def _bones_of_panels(self):
-        """For each panel the bones of each side of the body, and the marked ones."""
-        by_side = bones_by_side(self.skeleton)
-        if self.marked is None:
-            return [by_side] * len(self.scenes)
-        return [
-            {side: [b for b in bones if b not in marked] for side, bones in by_side.items()}
-            | {"departing": marked}
-            for marked in self.marked
-        ]
-
-    def _prepare(self, axis, n_bodies):
-        """Create the artists of a panel."""
-        alpha = 1.0 if self.labels is not None or n_bodies == 1 else 0.45
-        width = 2.2 if alpha == 1 else 1.1
-        colors = {side: COLORS[side] for side in ("middle", "left", "right")}
-        if self.marked is not None:
-            colors = dict.fromkeys(colors, COLORS["quiet"])
-        bones = {side: bone_lines(axis, color, width, alpha) for side, color in colors.items()}
-        if self.marked is not None:
-            bones["departing"] = bone_lines(axis, COLORS["departure"], 2 * width, alpha, zorder=3)
-        self.bones_.append(bones)
-        if self.behind is not None:
-            self.behind_.append(bone_lines(axis, COLORS["shadow"], 3 * width, zorder=1))
-        joined = self.skeleton is not None and self.skeleton.bones
-        size = 3 * width if joined else 1.5 * width
-        color = colors["middle"]
-        self.heads_ += axis.plot([], [], "o", color=color, alpha=alpha, markersize=size)
+            if self.labels is not None:
+                axis.set_xticks(self._gap * np.arange(len(self.labels)), self.labels)
+        self.bones_ = [panel.bones for panel in self._bodies]
+        self.heads_ = [panel.dots for panel in self._bodies]
+        self.behind_ = [panel.shadows for panel in self._bodies] if self.behind else []
+        self._show(self._at)
 
     def _show(self, at):
         """Move all stick figures to a share of the time."""
@@ -585,28 +510,14 @@ class SkeletonDisplay:
         longest = max(max(of_scene, default=0) for of_scene in durations)
         for line in self.moments_:
             line.set_xdata([0, at])
-        for i, (scene, of_scene) in enumerate(zip(self._drawn, durations, strict=True)):
+        for panel, scene, of_scene, behind in zip(
+            self._bodies, self._drawn, durations, self._behind, strict=True
+        ):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in of_scene]
             bodies = [
                 x[whole(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
             ]
-            for side, lines in self.bones_[i].items():
-                lines.set_segments(_segments(bodies, self._bones[i][side]))
-            dots = [self._dots(body) for body in bodies]
-            self.heads_[i].set_data(np.concatenate(dots).T if dots else ([], []))
-        for lines, scene in zip(self.behind_, self._behind, strict=bool(self.behind_)):
-            bodies = [x[whole(at * (len(x) - 1))] for x in scene]
-            bones = [b for of_side in bones_by_side(self.skeleton).values() for b in of_side]
-            lines.set_segments(_segments(bodies, bones))
-
-    def _dots(self, body):
-        """The places of the dots of a body: its head, or all joints if there are no bones."""
-        skeleton = self.skeleton
-        if skeleton is None or not skeleton.bones:
-            return body if skeleton is None else body[: len(skeleton.joints)]
-        if "head" not in skeleton.landmarks:
-            return body[:0]
-        return landmark_track(body[np.newaxis], skeleton, "head")
+            panel.show(bodies, [x[whole(at * (len(x) - 1))] for x in behind])
 
 
 def _time_line(axis):
@@ -627,16 +538,6 @@ def _time_line(axis):
 def postures_at(frames, performances):
     """Scenes of single postures: for each frame a panel with those of all performances."""
     return [[x[[frame]] for x in performances] for frame in frames]
-
-
-def _segments(bodies, bones):
-    """The bones of each body as one line with gaps: matplotlib draws few long lines faster."""
-    if not bones:
-        return []
-    lines, ends = np.full((len(bodies), len(bones), 3, 2), np.nan), np.array(bones)
-    for line, body in zip(lines, bodies, strict=True):
-        line[:, :2] = body[ends]
-    return list(lines.reshape(len(bodies), -1, 2))
 
 
 def _frames_of_model(frames, n_frames):

@@ -2,39 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from textwrap import fill
 from typing import Any, Literal, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
+from sklearn.utils.validation import check_is_fitted
 
 from ..body.direction_cosines import DirectionCosines
+from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.types import (
-    Features,
-    Indexed,
-    NumbersLike,
-    PerformanceLike,
-    PerformancesLike,
-    ValuesLike,
-)
+from ..inputs.types import Features, PerformanceLike, ValuesLike
 from ..inputs.wording import counted
 from ..matching.counting import runs_of
 from ..online.members import Track
 from ..online.tracker import MotionTracker
 from .arguments import (
     TIME_LABELS,
-    AxesLike,
-    Takes,
     as_frames,
-    as_index,
     as_names,
-    one_each,
+    labels_of_signals,
     times_from_zero,
 )
+from .base import COLORS, WIDTH, AxesLike, Display, empty_lists, legend_above
 from .bodies import invert_postures
-from .drawing import COLORS, WIDTH, empty_lists, legend_above, panels
 from .limb_departures import bones_of_limbs, limb_of
 from .stick_figures import SkeletonDisplay, postures_at
 
@@ -50,13 +43,14 @@ _PANEL = 1.15
 _LINE_LENGTH = 18
 
 
-class TrackingDisplay:
+@dataclass(eq=False, repr=False)
+class TrackingDisplay(Display):
     """A tracked body with hidden parts: the estimate with its band, and the true course.
 
     One panel a feature: what was observed, the estimate with the band that contains 90 %, and the
     true course if it is known. Grey are times at which the feature was hidden, hatched those at
     which the tracker was lost. Below are phase and rate. Make one with `from_estimator` or
-    `from_predictions`; `strip` and `side_by_side` draw the bodies.
+    `from_predictions`; `strip` draws the bodies.
 
     Parameters
     ----------
@@ -74,11 +68,14 @@ class TrackingDisplay:
         The names of all features.
     unit : {"frames", "seconds"}, default="frames"
         The unit of the times.
+    features : int, str or list of them, default=None
+        Those that are drawn, by index or name; by default those of the features hidden at any time,
+        or of all if none was, whose estimates vary most, at most four.
+    xlabel : str, default=None
+        The label of the time axis, in place of that of the unit.
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
     axes_ : list of Axes
         One a feature, then those of the phase and the rate.
     estimates_, truths_, observed_ : list of Line2D
@@ -104,26 +101,26 @@ class TrackingDisplay:
     TrackingDisplay(60 frames of 2 features, 1 of them hidden at times)
     """
 
-    def __init__(
-        self,
-        track: Track,
-        *,
-        truth: PerformanceLike | None = None,
-        observed: PerformanceLike | None = None,
-        times: ValuesLike | None = None,
-        n_frames: int | None = None,
-        names: Sequence[str] | None = None,
-        unit: Literal["frames", "seconds"] = "frames",
-    ) -> None:
-        shape = np.shape(track.postures)
-        self.track, self.n_frames, self.unit = track, n_frames, unit
-        self.truth = None if truth is None else np.asarray(truth, dtype=np.float64)
-        self.observed = None if observed is None else np.asarray(observed, dtype=np.float64)
-        self.times = times_from_zero(times, shape[0])
-        self.names = [f"x{k}" for k in range(shape[1])] if names is None else names
-        self.hidden = np.zeros(shape, dtype=bool)
-        if self.observed is not None:
-            self.hidden = np.isnan(self.observed)
+    track: Track
+    truth: PerformanceLike | None = None
+    observed: PerformanceLike | None = None
+    times: ValuesLike | None = None
+    n_frames: int | None = None
+    names: Sequence[str] | None = None
+    unit: Literal["frames", "seconds"] = "frames"
+    features: Features | None = None
+    xlabel: str | None = None
+
+    def __post_init__(self):
+        shape = np.shape(self.track.postures)
+        self.truth, self.observed = (
+            None if x is None else np.asarray(x, dtype=np.float64)
+            for x in (self.truth, self.observed)
+        )
+        self.times = times_from_zero(self.times, shape[0])
+        self.names = [f"x{k}" for k in range(shape[1])] if self.names is None else self.names
+        nothing = np.zeros(shape, dtype=bool)
+        self.hidden = nothing if self.observed is None else np.isnan(self.observed)
 
     def __repr__(self):
         n_frames, n_features = self.hidden.shape
@@ -137,15 +134,14 @@ class TrackingDisplay:
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: PerformanceLike,
         *,
-        truth: PerformancesLike | None = None,
-        smooth: bool = False,
-        times: Indexed[ValuesLike] | ValuesLike | None = None,
-        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
-        take: int = 0,
+        truth: PerformanceLike | None = None,
+        times: ValuesLike | None = None,
         features: Features | None = None,
         names: Sequence[str] | None = None,
+        units: str | Sequence[str] | Mapping[str, str] | None = None,
+        xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Track a take, and draw the estimate.
@@ -154,22 +150,22 @@ class TrackingDisplay:
         ----------
         estimator : MotionTracker
             Fitted.
-        X : array-like (n_frames, n_observed), or takes
-            As ``estimator.track`` takes them.
-        truth : array-like (n_frames, n_features), or as many as takes, default=None
-            The true features, in the form of X.
-        smooth : bool, default=False
-            Whether to use ``estimator.smooth``, whose estimates depend on the whole take.
-        times : array-like (n_frames,), or as many as takes, default=None
+        X : array-like, shape (n_frames, n_features)
+            One take, NaN where a feature was hidden.
+        truth : array-like, shape (n_frames, n_features), default=None
+            The true features.
+        times : array-like, shape (n_frames,), default=None
             The times of the frames, in seconds if the estimator has a frame rate.
-        projection : array-like, default=None
-            As for ``estimator.track``. The observations are then not drawn: they are no features.
-        take : int, default=0
-            The index of the take.
         features : int, str or list of them, default=None
-            See `plot`.
+            Those that are drawn, by index or name; by default those of the features hidden at any
+            time, or of all if none was, whose estimates vary most, at most four.
         names : list of str, default=None
             The names of all features; by default those of ``fit``.
+        units : str, list of str or dict, default=None
+            The units of the features for their labels: of all, one each, or by name. By default
+            what tables tell in ``attrs["units"]``.
+        xlabel : str, default=None
+            The label of the time axis, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -181,55 +177,51 @@ class TrackingDisplay:
         Raises
         ------
         ValueError
-            As from ``estimator.track``; or if there is no such take or feature.
+            As from ``estimator.track``; or if there is no such feature.
+
+        See Also
+        --------
+        from_predictions : Draws what ``estimator.smooth`` found, or a track from projections.
         """
         if not isinstance(estimator, MotionTracker):
             raise ValueError(f"Give a MotionTracker, got {type(estimator).__name__}.")
-        takes = Takes(estimator, X)
-        i = as_index(take, len(takes.arrays), "take")
-        stamps = None if times is None else takes.select_times(times, [i], "takes")
-        true = None
-        if truth is not None:
-            true_takes = Takes(estimator, truth, "The truth").arrays
-            true = one_each(true_takes, len(takes.arrays), "truth", "takes")[i]
-        method = estimator.smooth if smooth else estimator.track
-        (track,) = method(takes.select([i]), stamps, projection)
-        n_frames, n_features = track.postures.shape
-        if true is not None and np.shape(true) != (n_frames, n_features):
+        check_is_fitted(estimator)
+        if np.ndim(X) != 2:
             raise ValueError(
-                f"The truth must have the shape {(n_frames, n_features)}, got {np.shape(true)}."
+                f"X must be one take, 2-D, got an array-like with {np.ndim(X)} axes: "
+                "of several takes give one."
+            )
+        (track,) = estimator.track([X], None if times is None else [times])
+        n_frames, n_features = track.postures.shape
+        if truth is not None and np.shape(truth) != (n_frames, n_features):
+            raise ValueError(
+                f"The truth must have the shape {(n_frames, n_features)}, got {np.shape(truth)}."
             )
         rate = 1.0 if estimator.frame_rate is None else estimator.frame_rate
         if names is None:
             names = names_of_features(None, estimator, n_features)
-        display = cls(
+        names = as_names(names, n_features, "names", "features")
+        chosen = None if features is None else choose_features(features, names)
+        return cls(
             track,
-            truth=true,
-            observed=takes.arrays[i] if projection is None else None,
-            times=np.arange(n_frames) / rate if stamps is None else stamps[0],
+            truth=truth,
+            observed=X,
+            times=np.arange(n_frames) / rate if times is None else times,
             n_frames=estimator.n_frames_,
-            names=as_names(names, n_features, "names", "features"),
+            names=labels_of_signals(names, units_of_columns(X), units=units),
             unit="frames" if estimator.frame_rate is None else "seconds",
-        )
-        return display.plot(ax, features=features)
+            features=chosen,
+            xlabel=xlabel,
+        ).plot(ax)
 
     @classmethod
-    def from_predictions(
-        cls,
-        track: Track,
-        *,
-        features: Features | None = None,
-        ax: AxesLike | None = None,
-        **known: Any,
-    ) -> Self:
+    def from_predictions(cls, track: Track, *, ax: AxesLike | None = None, **known: Any) -> Self:
         """Draw a track that is known already.
 
         Parameters
         ----------
         track : Track
             The track of one take.
-        features : int, str or list of them, default=None
-            See `plot`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **known : dict
@@ -251,50 +243,42 @@ class TrackingDisplay:
                 f"track must be the Track of one take, as from MotionTracker.track; got {got}. Of "
                 "a list of them give one."
             )
-        return cls(track, **known).plot(ax, features=features)
+        return cls(track, **known).plot(ax)
 
-    def plot(self, ax: AxesLike | None = None, *, features: Features | None = None) -> Self:
-        """Draw.
+    def _shown(self):
+        """The features that are drawn, by index."""
+        if self.features is not None:
+            return choose_features(self.features, self.names)
+        variance = np.var(self.track.postures, axis=0)
+        hidden = self.hidden.any(axis=0)
+        candidates = np.flatnonzero(hidden if hidden.any() else ~hidden)
+        return candidates[np.argsort(-variance[candidates], kind="stable")][:_N_FEATURES]
 
-        Parameters
-        ----------
-        ax : Axes or array-like of Axes, default=None
-            One of a figure's subplots is divided into the panels; or one axes a panel. None
-            makes a figure.
-        features : int, str or list of them, default=None
-            By index or name; by default those of the features hidden at any time, or of all if
-            none was, whose estimates vary most, at most four.
+    def _layout(self):
+        count = len(self._shown()) + 2
+        return [(i, 0) for i in range(count)], (count, 1), (WIDTH, _PANEL * count + 0.6)
 
-        Returns
-        -------
-        TrackingDisplay
-            The display itself.
-        """
-        shown = self._most_varied() if features is None else choose_features(features, self.names)
-        count = len(shown) + 2
-        size = WIDTH, _PANEL * count + 0.6
-        cells, before = [(i, 0) for i in range(count)], getattr(self, "axes_", ())
-        self.figure_, self.axes_ = panels(ax, cells, count, 1, size, before)
+    def _draw(self):
+        shown = self._shown()
         self.estimates_, self.bands_, self.truths_, self.observed_ = empty_lists(4)
         for axis, k in zip(self.axes_, shown, strict=False):
             self._draw_feature(axis, k)
         self._draw_progress(*self.axes_[-2:])
         any_hidden = self.hidden[:, shown].any(axis=1)
         masks = [*self.hidden[:, shown].T, any_hidden, any_hidden]
+        lost = np.asarray(self.track.lost, dtype=bool)
         grey, violet = COLORS["shadow"], COLORS["departure"]
         self.hidden_ = [
             [
-                axis.axvspan(a, b, label="hidden", color=grey, alpha=0.7, linewidth=0, zorder=0)
-                for a, b in self._spans(mask)
+                axis.axvspan(*span, label="hidden", color=grey, alpha=0.7, linewidth=0, zorder=0)
+                for span in self._spans(mask)
             ]
             for axis, mask in zip(self.axes_, masks, strict=True)
         ]
-        lost = self._spans(np.asarray(self.track.lost, dtype=bool))
         self.lost_ = [
             [
                 axis.axvspan(
-                    a,
-                    b,
+                    *span,
                     label="lost",
                     facecolor="none",
                     edgecolor=violet,
@@ -303,19 +287,21 @@ class TrackingDisplay:
                     alpha=0.5,
                     zorder=0.5,
                 )
-                for a, b in lost
+                for span in self._spans(lost)
             ]
             for axis in self.axes_
         ]
+        phase = "phase (frame)" if self.n_frames is None else "phase (%)"
+        names = [fill(self.names[k], _LINE_LENGTH) for k in shown]
+        time, ends = self.xlabel or TIME_LABELS[self.unit], (0, np.ravel(self.times)[-1] or 1.0)
+        self._label_axes(self.axes_, [*names, phase, "rate"], time, ends=ends)
         for axis in self.axes_:
-            axis.set_xlim(0, self.times[-1] or 1.0)
             axis.tick_params(labelbottom=axis is self.axes_[-1])
-        self.axes_[-1].set_xlabel(TIME_LABELS[self.unit])
+            axis.yaxis.label.set_fontsize("small")
         self.figure_.align_ylabels(self.axes_)
         handles, labels = self.axes_[0].get_legend_handles_labels()
         of_label = dict(zip(labels, handles, strict=True))
         legend_above(self.axes_[:1], list(of_label.values()), list(of_label))
-        return self
 
     def strip(
         self,
@@ -323,7 +309,6 @@ class TrackingDisplay:
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
-        at: float = 0.0,
         azimuth: float = -60,
     ) -> SkeletonDisplay:
         """Draw estimated bodies at some frames, before the true ones; hidden limbs are violet.
@@ -336,8 +321,6 @@ class TrackingDisplay:
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
             As for `SkeletonDisplay.plot`.
-        at : float in [0, 1], default=0.0
-            As for `SkeletonDisplay.plot`.
         azimuth : float, default=-60
             As for `SkeletonDisplay.plot`.
 
@@ -346,62 +329,23 @@ class TrackingDisplay:
         SkeletonDisplay
             The display of the bodies, drawn.
         """
-        skeleton, estimate, truth = self._bodies(cosines)
+        if not isinstance(cosines, DirectionCosines):
+            raise ValueError(f"cosines must be DirectionCosines, got {type(cosines).__name__}.")
+        skeleton = cosines.skeleton.body()
+        estimate = invert_postures(self.track.postures, cosines, skeleton)
         shown = as_frames(frames, len(estimate))
         limbs = np.array([limb_of(name) for name in cosines.get_feature_names_out()])
         marked = [bones_of_limbs(limbs[self.hidden[frame]], skeleton) for frame in shown]
         titles = [f"frame {k}" for k in shown]
         if self.unit == "seconds":
-            titles = [f"{self.times[k]:.1f} s" for k in shown]
-        return SkeletonDisplay(
-            postures_at(shown, [estimate]),
-            skeleton,
-            titles,
-            marked=marked,
-            behind=None if truth is None else postures_at(shown, [truth]),
-        ).plot(ax, at=at, azimuth=azimuth)
-
-    def side_by_side(
-        self,
-        cosines: DirectionCosines,
-        *,
-        ax: AxesLike | None = None,
-        at: float = 0.0,
-        azimuth: float = -60,
-    ) -> SkeletonDisplay:
-        """Draw the observed, the estimated and the true body side by side.
-
-        Parameters
-        ----------
-        cosines : DirectionCosines
-            The fitted transformer of the features.
-        ax : Axes or array-like of Axes, default=None
-            As for `SkeletonDisplay.plot`.
-        at : float in [0, 1], default=0.0
-            As for `SkeletonDisplay.plot`.
-        azimuth : float, default=-60
-            As for `SkeletonDisplay.plot`.
-
-        Returns
-        -------
-        SkeletonDisplay
-            The display of the bodies, drawn at the beginning; see `SkeletonDisplay.animate`.
-        """
-        skeleton, estimate, truth = self._bodies(cosines)
-        bodies = {"estimate": estimate, "truth": truth}
-        if self.observed is not None:
-            bodies = {"seen": invert_postures(self.observed, cosines, skeleton)} | bodies
-        bodies = {name: x for name, x in bodies.items() if x is not None}
-        title = ["what is known of a body"]
-        display = SkeletonDisplay([list(bodies.values())], skeleton, title, labels=list(bodies))
-        return display.plot(ax, at=at, azimuth=azimuth)
-
-    def _most_varied(self):
-        """The features of largest variance among those that were hidden."""
-        variance = np.var(self.track.postures, axis=0)
-        hidden = self.hidden.any(axis=0)
-        candidates = np.flatnonzero(hidden if hidden.any() else ~hidden)
-        return candidates[np.argsort(-variance[candidates], kind="stable")][:_N_FEATURES]
+            titles = [f"{time:.1f} s" for time in np.asarray(self.times)[shown]]
+        behind = None
+        if self.truth is not None:
+            behind = postures_at(shown, [invert_postures(self.truth, cosines, skeleton)])
+        scenes = postures_at(shown, [estimate])
+        return SkeletonDisplay(scenes, skeleton, titles, marked=marked, behind=behind).plot(
+            ax, azimuth=azimuth
+        )
 
     def _draw_feature(self, axis, k):
         estimate = self.track.postures[:, k]
@@ -420,35 +364,21 @@ class TrackingDisplay:
         if self.observed is not None:
             seen = self.observed[:, k]
             self.observed_ += axis.plot(times, seen, ".", color=black, markersize=2.5, label="seen")
-        axis.set_ylabel(fill(self.names[k], _LINE_LENGTH), fontsize="small")
 
     def _draw_progress(self, upper, lower):
-        phases, label = self.track.phases, "phase (frame)"
+        phases = np.asarray(self.track.phases)
         if self.n_frames is not None:
-            phases, label = 100 * np.asarray(phases) / (self.n_frames - 1), "phase (%)"
+            phases = 100 * phases / (self.n_frames - 1)
             upper.set_ylim(-3, 103)
         blue = COLORS["performance"]
         (self.phase_,) = upper.plot(self.times, phases, color=blue)
-        upper.set_ylabel(label, fontsize="small")
         lower.axhline(1, color=COLORS["envelope"], linewidth=1, linestyle="--")
         (self.rate_,) = lower.plot(self.times, self.track.rates, color=blue)
         # The axis may be shared with another display.
         lower.set_ylim(0, max(lower.get_ylim()[1], 1.1 * max(1, *self.track.rates)))
-        lower.set_ylabel("rate", fontsize="small")
 
     def _spans(self, mask):
         """The times of frames, up to the middle between frames, as (start, stop)."""
         middles = (self.times[1:] + self.times[:-1]) / 2
         bounds = np.concatenate([self.times[:1], middles, self.times[-1:]])
         return bounds[runs_of(mask)]
-
-    def _bodies(self, cosines):
-        """The skeleton, the estimated bodies, and the true ones or None."""
-        if not isinstance(cosines, DirectionCosines):
-            raise ValueError(f"cosines must be DirectionCosines, got {type(cosines).__name__}.")
-        skeleton = cosines.skeleton.body()
-        estimate, truth = (
-            None if x is None else invert_postures(x, cosines, skeleton)
-            for x in (self.track.postures, self.truth)
-        )
-        return skeleton, estimate, truth

@@ -2,58 +2,50 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
+from sklearn.utils import Bunch
 
-from ..inputs.types import NumbersLike, PerformanceLike, PerformancesLike, ValuesLike
+from ..inputs.types import PerformancesLike
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
-from .arguments import AxesLike
-from .drawing import COLORS, WIDTH, legend_above, panels
-from .time_axis import own_keyframes
+from .base import COLORS, WIDTH, AxesLike, Display, keyframes_of_trials, legend_above
 
 __all__ = ["TrellisDisplay"]
 
 
-class TrellisDisplay:
+@dataclass(eq=False, repr=False)
+class TrellisDisplay(Display):
     """The disparity space of one pair of performances, and the path through it (Fig. 2).
 
     Use `from_estimator`.
 
     Parameters
     ----------
-    frames : array-like, shape (n_frames,)
-        Frames p of the pattern: all of them or, of long takes, evenly spaced ones.
-    offsets : array-like, shape (n_offsets,)
-        Offsets d in frames of the pattern, evenly spaced.
-    costs : array-like, shape (n_frames, n_offsets)
-        E(p, d), the difference between the pattern at p and the performance at p + d; NaN where no
-        path that obeys Eqs. 9 and 13 can pass.
-    path : array-like, shape (P,)
-        The offsets of the best path between the pattern and the performance.
-    warp : array-like, shape (P,)
+    space : Bunch
+        From `DenseSynchronizer.disparity_space`: frames, offsets, costs, and the best path.
+    warp : ndarray, shape (P,)
         The final offsets Delta(p), after consensus, smoothing and refinement.
-    names : (str, str), default=("template", "trial")
+    names : (str, str)
         Names of the pattern and of the performance.
-    keyframes : array-like, shape (n_keyframes, 2), default=None
+    keyframes : ndarray, shape (n_keyframes, 2), default=None
         The frame of each key-frame in the pattern, and the offset of the performance there; NaN
         where one is not known.
 
     Attributes
     ----------
-    figure_ : Figure
-        The figure of the last plot.
-    ax_ : Axes
-        The axes of the last plot.
+    axes_ : list of Axes
+        The panel.
     image_ : AxesImage
         The costs.
     path_, warp_ : Line2D
         The best path, and the final warp.
     keyframes_ : Line2D or None
         The key-frames, as points.
-    colorbar_ : Colorbar or None
+    colorbar_ : Colorbar
         The scale of the costs.
 
     Examples
@@ -64,25 +56,14 @@ class TrellisDisplay:
     >>> bunch = make_bending(6, random_state=0)
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
     >>> display = TrellisDisplay.from_estimator(DenseSynchronizer(50).fit(X), X, performance=2)
-    >>> display.costs.shape
+    >>> display.space.costs.shape
     (50, 41)
     """
 
-    def __init__(
-        self,
-        frames: ValuesLike,
-        offsets: ValuesLike,
-        costs: PerformanceLike,
-        path: ValuesLike,
-        warp: ValuesLike,
-        *,
-        names: tuple[str, str] = ("template", "trial"),
-        keyframes: NumbersLike | None = None,
-    ) -> None:
-        self.frames, self.offsets = np.asarray(frames, dtype=np.float64), np.asarray(offsets)
-        self.costs, self.path, self.warp = np.asarray(costs), np.asarray(path), np.asarray(warp)
-        self.names = names
-        self.keyframes = None if keyframes is None else np.asarray(keyframes, dtype=np.float64)
+    space: Bunch
+    warp: np.ndarray
+    names: tuple[str, str]
+    keyframes: np.ndarray | None = None
 
     def __repr__(self):
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
@@ -95,8 +76,6 @@ class TrellisDisplay:
         *,
         performance: int = 0,
         ax: AxesLike | None = None,
-        colorbar: bool = True,
-        keyframe_points: bool = True,
         **params: Any,
     ) -> Self:
         """Draw the disparity space of the pattern and one performance.
@@ -110,13 +89,10 @@ class TrellisDisplay:
         performance : int, default=0
             The index of the performance that is matched to the pattern.
         ax : Axes, default=None
-            Axes to draw on. None makes a figure.
-        colorbar : bool, default=True
-            Whether to draw a scale of the costs.
-        keyframe_points : bool, default=True
-            Whether to draw the key-frames that are given for the performance.
+            See `plot`.
         **params : dict
-            Further arguments of the synchronizer and of steps before, such as ``keyframes``.
+            Further arguments of the synchronizer and of steps before, such as ``keyframes``, which
+            are drawn as points.
 
         Returns
         -------
@@ -133,101 +109,72 @@ class TrellisDisplay:
             warp = synchronizer.match(performances.take([performance])).offsets[0]
         index = index_of_pattern(synchronizer, performances)
         names = ("template" if index is None else f"template {index}", f"trial {performance}")
-        keyframes = own_keyframes(synchronizer, performances, reached.params)
+        keyframes = keyframes_of_trials(synchronizer, performances, reached.params)
         if keyframes is not None:
             last = (synchronizer.n_frames_ - 1) / (len(performances[performance]) - 1)
             at = synchronizer.keyframes_
             keyframes = np.column_stack([at, keyframes[performance] * last - at])
-        display = cls(
-            space.frames,
-            space.offsets,
-            space.costs,
-            space.path,
-            warp,
-            names=names,
-            keyframes=keyframes,
-        )
-        return display.plot(ax, colorbar=colorbar, keyframe_points=keyframe_points)
+        return cls(space, warp, names, keyframes).plot(ax)
 
-    def plot(
-        self,
-        ax: AxesLike | None = None,
-        *,
-        colorbar: bool = True,
-        keyframe_points: bool = True,
-    ) -> Self:
-        """Draw.
+    def _layout(self):
+        return [(0, 0)], (1, 1), (WIDTH, 4)
 
-        Parameters
-        ----------
-        ax : Axes, default=None
-            Axes to draw on. None makes a figure.
-        colorbar : bool, default=True
-            Whether to draw a scale of the costs.
-        keyframe_points : bool, default=True
-            Whether to draw key-frames, if there are some.
-
-        Returns
-        -------
-        TrellisDisplay
-            The display itself.
-        """
+    def _draw(self):
         from matplotlib.colors import PowerNorm
         from matplotlib.patches import Patch
         from matplotlib.patheffects import Normal, Stroke
 
-        self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, (WIDTH, 4))
-        frames = np.arange(len(self.path))
+        (axis,), space = self.axes_, self.space
+        frames = np.arange(len(space.path))
         # Low costs are dark; the square root resolves differences among them.
-        self.image_ = self.ax_.imshow(
-            np.ma.masked_invalid(self.costs.T),
+        self.image_ = axis.imshow(
+            np.ma.masked_invalid(space.costs.T),
             origin="lower",
             aspect="auto",
-            extent=(*_edges(self.frames), *_edges(self.offsets)),
+            extent=(*_edges(space.frames), *_edges(space.offsets)),
             interpolation="nearest",
             cmap="cividis",
             norm=PowerNorm(0.5, vmin=0),
         )
-        self.ax_.set_facecolor("0.85")
-        outline = [Stroke(linewidth=4, foreground="white"), Normal()]
-        (self.path_,) = self.ax_.plot(
-            frames, self.path, color="#D55E00", linewidth=2, path_effects=outline, label="best path"
+        axis.set_facecolor("0.85")
+        rims = ([Stroke(linewidth=width, foreground="white"), Normal()] for width in (4, 3))
+        (self.path_,) = axis.plot(
+            frames,
+            space.path,
+            label="best path",
+            color=COLORS["mean"],
+            linewidth=2,
+            path_effects=next(rims),
         )
-        (self.warp_,) = self.ax_.plot(
+        (self.warp_,) = axis.plot(
             frames,
             self.warp,
             "--",
+            label="warp in the end",
             color=COLORS["pattern"],
             linewidth=1.6,
-            path_effects=[Stroke(linewidth=3, foreground="white"), Normal()],
-            label="warp in the end",
+            path_effects=next(rims),
         )
-        self.ax_.set_title(f"{self.names[1]} matched to {self.names[0]}", fontsize="medium")
-        self.ax_.set_xlabel(f"frame p of {self.names[0]}")
-        self.ax_.set_ylabel(f"offset d of {self.names[1]} (frames)")
+        axis.set_title(f"{self.names[1]} matched to {self.names[0]}", fontsize="medium")
+        offset = f"offset d of {self.names[1]} (frames)"
+        self._label_axes([axis], [offset], f"frame p of {self.names[0]}")
         outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
         handles, self.keyframes_ = [self.path_, self.warp_, outside], None
-        points = self.keyframes if keyframe_points else None
-        if points is not None and np.isfinite(points).all(axis=1).any():
-            (self.keyframes_,) = self.ax_.plot(
-                points[:, 0],
-                points[:, 1],
+        if self.keyframes is not None and np.isfinite(self.keyframes).all(axis=1).any():
+            (self.keyframes_,) = axis.plot(
+                *self.keyframes.T,
                 "o",
+                label="key-frame",
                 color="white",
                 markersize=7,
                 markeredgecolor="black",
-                linestyle="none",
                 zorder=5,
-                label="key-frame",
             )
             handles.append(self.keyframes_)
-        legend_above([self.ax_], handles, [handle.get_label() for handle in handles])
-        self.ax_.grid(False)
-        self.colorbar_ = None
-        if colorbar:
-            self.colorbar_ = self.figure_.colorbar(self.image_, ax=self.ax_)
-            self.colorbar_.set_label("difference E(p, d); dark: alike")
-        return self
+        legend_above([axis], handles)
+        axis.grid(False)
+        self.colorbar_ = self.figure_.colorbar(self.image_, ax=axis)
+        self.colorbar_.set_label("difference E(p, d); dark: alike")
 
 
 def _edges(centres):

@@ -12,7 +12,7 @@ from string import Template
 
 import numpy as np
 
-from ..display.drawing import pyplot
+from ..display.base import pyplot
 from ..matching.counting import whole
 
 __all__ = [
@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 # Pixels an inch of the figures.
-_DPI = 180
+DPI = 180
 
 
 class Page:
@@ -198,7 +198,7 @@ def number(value, largest=None):
 def picture(figure, text):
     """A figure as an image within the page, with a text in its place."""
     file = BytesIO()
-    figure.savefig(file, format="png", dpi=_DPI, metadata={"Software": None})
+    figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
     pyplot().close(figure)
     code = base64.b64encode(file.getvalue()).decode("ascii")
     return f'<img src="data:image/png;base64,{code}" alt="{escape(text)}">'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import pathlib
+from bisect import bisect_right
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -12,6 +13,7 @@ from sklearn.pipeline import make_pipeline
 from ..body.base import PositionsTransformer
 from ..body.skeleton import Skeleton
 from ..display.arguments import as_names, as_performances, labels_as_text
+from ..display.base import COLORS
 from ..display.bodies import (
     bones_by_side,
     landmark_track,
@@ -19,8 +21,7 @@ from ..display.bodies import (
     project,
     read_positions,
 )
-from ..display.drawing import COLORS
-from ..display.time_axis import check_own_keyframes
+from ..inputs.numbers import as_numbers
 from ..inputs.resampling import as_frame_rates
 from ..inputs.types import NamesLike, NumbersLike, Path, PerformancesLike, Table, ValuesLike
 from ..inputs.wording import counted
@@ -28,7 +29,7 @@ from ..synchronizers.match import Match, match_of_times, rates_of
 from ..utils.pipelines import find_synchronizer, flat_steps, transform_through, union_transformers
 from .page import Page, check_path, paragraph, read_part
 
-__all__ = ["add_player", "bodies_of", "data_of_bodies", "player_of", "write_player"]
+__all__ = ["add_player_of", "player_of", "write_player"]
 
 # Coordinates that a report holds, at most, of two bytes each: 4 MB of text. And frames a trial that
 # a movement needs at least; where these are too many, there are fewer trials.
@@ -158,7 +159,12 @@ def write_player(
 def _marks(keyframes, lengths, times):
     """Key-frames by name, as shares of each performance and of the clock; None if not known."""
     names = [str(name) for name in getattr(keyframes, "columns", ())]
-    frames = check_own_keyframes(keyframes, len(lengths))
+    frames = as_numbers(keyframes, "keyframes", dtype=np.float64)
+    if frames.ndim != 2 or len(frames) != len(lengths):
+        raise ValueError(
+            f"keyframes must have shape ({len(lengths)}, n_keyframes), one row a performance, with "
+            f"NaN where one is not known; got {frames.shape}."
+        )
     shares, out = frames / (lengths[:, np.newaxis] - 1), []
     outside = np.argwhere((shares < 0) | (shares > 1))
     if len(outside):
@@ -182,7 +188,7 @@ def _marks(keyframes, lengths, times):
     return out
 
 
-def bodies_of(estimator, X, params):
+def _bodies_of(estimator, X, params):
     """The joint positions that reach the first step with a skeleton, and that; else X and None.
 
     Parameters
@@ -203,6 +209,14 @@ def bodies_of(estimator, X, params):
                 X = transform_through(earlier, X, params, "write_report", also=also)
                 return X, transformer.skeleton
     return X, None
+
+
+def add_player_of(page, trials, estimator, X, params, skeleton):
+    """Add the player of a report, where there are bodies."""
+    if skeleton is None:
+        X, skeleton = _bodies_of(estimator, X, params)
+    if skeleton is not None:
+        add_player(page, *player_of(trials, X, skeleton))
 
 
 def player_of(trials, X, skeleton):
@@ -328,12 +342,8 @@ def _points(x, skeleton, i):
 
 def _longest(lengths, most):
     """The largest number of frames of a trial with which all have so many frames together."""
-    low, high = 2, max(lengths)
-    while low < high:
-        middle = (low + high + 1) // 2
-        fits = np.minimum(lengths, middle).sum() <= most
-        low, high = (middle, high) if fits else (low, middle - 1)
-    return low
+    counts = range(2, max(lengths) + 1)
+    return max(bisect_right(counts, most, key=lambda n: np.minimum(lengths, n).sum()) + 1, 2)
 
 
 def _packed(values, dtype):

@@ -6,7 +6,7 @@ import pathlib
 import re
 from collections.abc import Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,12 +16,24 @@ from sklearn.base import BaseEstimator
 from ..body.skeleton import Skeleton
 from ..comparison.curves import AlignedCurves
 from ..comparison.groups import compare_aligned
-from ..comparison.study import Study
-from ..display.drawing import WIDTH, curves, front_line, group_styles, legend_above, panels, pyplot
+from ..comparison.study import GroupsOfPeople, Study
+from ..display.arguments import labels_of_signals
+from ..display.base import (
+    WIDTH,
+    TimeAxis,
+    clock_rate,
+    curves,
+    front_line,
+    group_styles,
+    legend_above,
+    named_keyframes,
+    panels,
+    pyplot,
+)
 from ..display.groups import display_of_groups
 from ..display.synchronization import SynchronizationDisplay
-from ..display.time_axis import TimeAxis, clock_rate, draw_keyframes, named_keyframes, offset_label
 from ..inputs.features import choose_features
+from ..inputs.resampling import as_frame_rates
 from ..inputs.types import (
     Features,
     Labels,
@@ -31,22 +43,21 @@ from ..inputs.types import (
     Unit,
     ValuesLike,
 )
+from ..inputs.validation import labels_of_input
 from ..inputs.wording import counted
-from ..synchronizers.match import UNITS
-from ..utils.pipelines import flat_steps
+from ..matching.counting import first_largest
+from ..synchronizers.match import UNITS, rates_of
+from ..utils.groups import names_of_groups
+from ..utils.pipelines import flat_steps, index_of_pattern
 from .page import Page, check_path, list_of, number, paragraph, picture, table_of
-from .player import add_player, bodies_of, player_of
-from .tables import TrialSet, as_text
+from .player import add_player_of
 
-__all__ = [
-    "draw_offsets",
-    "draw_signals",
-    "own_figures",
-    "write_report",
-]
+__all__ = ["TrialSet", "draw_offsets", "draw_signals", "own_figures", "write_report"]
 
 # Signals in the figure if none are named; of more, the first four.
 _MOST_SIGNALS = 6
+# Numbers of the tables that have a row a frame, at most: some 4 MB of text.
+MOST_NUMBERS = 500_000
 # The place of an object in memory, which differs from run to run.
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
@@ -72,15 +83,13 @@ def write_report(
 ) -> pathlib.Path:
     """Write a report about aligned trials: one HTML file that opens anywhere without a network.
 
-    It has the set, the signals before and after alignment, the timing of every trial, the test of
-    groups, and doubtful trials. Its tables can be saved as CSV. Where there are bodies, a player
-    shows them side by side on one clock, or each at its own pace: at first two, others by choice.
+    It has the signals before and after alignment, the timing of every trial, the test of groups,
+    and doubtful trials, with tables as CSV. A player shows bodies side by side.
 
     Parameters
     ----------
     path : str or path
-        Of the file, such as ``"report.html"``. Its folder must exist. A file that is there already
-        is replaced once the report is complete.
+        Of the file, such as ``"report.html"``, which is replaced once the report is complete.
     estimator : synchronizer, or Pipeline with one
         Fitted, as for `compare_groups`.
     X : performances
@@ -94,14 +103,11 @@ def write_report(
     covariate : array-like of numbers, shape (n_sequences,), default=None
         Such as speed or age, instead of groups: a regression.
     signals : performances, default=None
-        What is shown and compared, such as joint angles in degrees; by default as in
-        `compare_groups`.
+        What is shown and compared; by default as in `compare_groups`.
     features : int, str or list of them, default=None
-        Those of the signals that are shown and compared. By default all; of more than six, the
-        figures show the first four.
+        Those of the signals; by default all, and in figures of more than six the first four.
     skeleton : Skeleton, default=None
-        Of the joint positions X, for the player. By default that of a step of the pipeline, such
-        as `DirectionCosines`; without one there is no player.
+        Of the joint positions X, for the player; by default that of a step of the pipeline.
     left_out : mapping of label to reason, default=None
         Trials that were left out before, and why.
     title : str, default=None
@@ -109,8 +115,8 @@ def write_report(
     unit : {"percent", "frames", "seconds"}, default="percent"
         Of time, as in `compare_groups`.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
-        Frames a second of X; by default what tables tell, as in `Match.offsets_in`. If it is known,
-        durations are in seconds. Where it is given, key-frames are in seconds, as for ``match``.
+        Frames a second of X, for durations in seconds; by default what tables tell. Where it is
+        given, key-frames are in seconds, as for ``match``.
     random_state : int, RandomState instance or None, default=0
         Draws the permutations of the test.
     **params : dict
@@ -123,27 +129,15 @@ def write_report(
 
     Raises
     ------
-    FileNotFoundError
-        If there is no such folder.
-    ImportError
-        If matplotlib is missing.
+    FileNotFoundError, ImportError
+        If there is no such folder, or matplotlib is missing.
     ValueError
-        If the path is that of a folder, or ``left_out`` is not a mapping; or as from
-        `compare_groups`.
+        If ``path`` or ``left_out`` is no such thing; or as from `compare_groups`.
 
     See Also
     --------
     compare_groups : The test, with more arguments.
     write_player : The player by itself.
-    sklearn_motionsync.display.GroupDisplay : The figure of groups, with more arguments.
-
-    Notes
-    -----
-    Size is limited. Joint positions have a precision of a 30 000th of the largest, and take 4 MB at
-    most: of more, longer trials have fewer frames in the player. Tables of frames take about 4 MB
-    at most: of more, they have every second frame, or fewer. The page names it.
-
-    The same input gives the same file, but for the date.
 
     Examples
     --------
@@ -156,11 +150,6 @@ def write_report(
     '<!DOCTYPE html>'
     """
     path = check_path(path, "report")
-    if left_out is not None and not isinstance(left_out, Mapping):
-        raise ValueError(
-            "left_out must be a mapping of labels of trials to reasons, such as "
-            f"{{'trial 7': 'the marker fell off'}}, or None; got {left_out!r:.80}."
-        )
     with own_figures():
         aligned = AlignedCurves.of(
             estimator,
@@ -172,25 +161,20 @@ def write_report(
             unit=unit,
             frame_rate=frame_rate,
         )
-        comparison = figure = None
+        comparison = None
         if groups is not None or covariate is not None or paired:
             study = Study.of(groups, covariate, people, paired, len(aligned.curves))
             comparison = compare_aligned(aligned, study, random_state=random_state)
-            display = display_of_groups(aligned, groups, people, comparison, features=features)
-            figure = display.plot().figure_
         trials = TrialSet.of(X, aligned, frame_rate, groups, people, covariate)
         page = Page()
         _add_set(page, trials, estimator, left_out)
         _add_signals(page, trials, features)
         _add_timing(page, trials)
         if comparison is not None:
-            _add_test(page, comparison, figure, groups is not None)
+            display = display_of_groups(aligned, groups, people, comparison, features=features)
+            _add_test(page, comparison, display.plot().figure_, groups is not None)
         _add_doubtful(page, trials)
-        bodies = X
-        if skeleton is None:
-            bodies, skeleton = bodies_of(estimator, X, params)
-        if skeleton is not None:
-            add_player(page, *player_of(trials, bodies, skeleton))
+        add_player_of(page, trials, estimator, X, params, skeleton)
     return page.write(path, "Aligned trials" if title is None else title)
 
 
@@ -198,6 +182,11 @@ def write_report(
 
 
 def _add_set(page, trials, estimator, left_out):
+    if left_out is not None and not isinstance(left_out, Mapping):
+        raise ValueError(
+            "left_out must be a mapping of labels of trials to reasons, such as "
+            f"{{'trial 7': 'the marker fell off'}}, or None; got {left_out!r:.80}."
+        )
     text = counted(len(trials.names), "trial")
     if "person" in trials.design:
         n_people = trials.design["person"].nunique()
@@ -296,30 +285,20 @@ def _of_frames(trials):
 
 def _add_test(page, comparison, figure, is_of_groups):
     clusters, unit = comparison.clusters, UNITS[comparison.unit]
-    shown = clusters[["what", "feature"]].set_axis(["differs in", "signal"], axis=1)
-    ends = [f"{number(a)} to {number(b)}" for a, b in clusters[["start", "end"]].to_numpy(float)]
-    shown[f"from, to ({unit})"] = ends
-    shown["direction"] = clusters["direction"]
-    sizes = clusters[["size", "lower", "upper"]].to_numpy(dtype=float)
-    shown["size"] = [
-        f"{number(size)} {unit}" for size, unit in zip(sizes[:, 0], clusters["unit"], strict=True)
-    ]
-    shown["interval of 95\u00a0%"] = [
-        f"{number(low)} to {number(high)}" for low, high in sizes[:, 1:]
-    ]
-    shown["p"] = clusters["p"].map("{:.3f}".format)
+    bounds = "95\u00a0% from", "95\u00a0% to"
+    shown = clusters[["what", "feature", "start", "end", "direction"]].set_axis(
+        ["differs in", "signal", f"from ({unit})", f"to ({unit})", "direction"], axis=1
+    )
+    shown[["size", *bounds, "unit", "p"]] = clusters[["size", "lower", "upper", "unit", "p"]]
     p_values = comparison.to_frame().reset_index()
     none = "" if len(clusters) else f"No stretch of frames differs at p = {comparison.level:g}."
     page.add(
         "Groups" if is_of_groups else "Covariate",
         paragraph(comparison.describe(), "finding"),
         picture(figure, f"Means, bands, and where they differ. {comparison.describe()}"),
-        table_of(shown, "Where they differ"),
+        table_of(shown, "Where they differ", ("size", *bounds)),
         paragraph(none),
-        table_of(
-            p_values.assign(p=p_values["p"].map("{:.3f}".format)),
-            "Probability of such differences by chance",
-        ),
+        table_of(p_values, "Probability of such differences by chance", ("p",)),
         paragraph(
             "Joint is the test of shape and timing together. Linear is the test of time-normalised "
             "curves, which does not tell them apart."
@@ -346,6 +325,163 @@ def _add_doubtful(page, trials):
         table_of(table, f"Look at {counted(len(rows), 'trial')} before using the warps"),
         page.offer(doubtful=table) if rows else "",
     )
+
+
+# -- the tables ---------------------------------------------------------------------------
+
+
+def as_text(label):
+    """A label of a trial; the levels of one with several are joined by commas."""
+    return ", ".join(map(str, label)) if isinstance(label, tuple) else str(label)
+
+
+class TrialSet(NamedTuple):
+    """What is known of the trials of a report.
+
+    Attributes
+    ----------
+    aligned : AlignedCurves
+    names : list of str
+    template : int or None
+        Its index, if it is one of the trials.
+    design : DataFrame
+        What was given of each trial: ``group``, ``person``, ``covariate``.
+    of_groups : GroupsOfPeople
+    frames : ndarray of int, shape (n_sequences,)
+        The lengths of the trials.
+    seconds : ndarray, shape (n_sequences,), or None
+        Their durations, if the frame rate is known.
+    signals : list of str
+        Names with units, in one line or two.
+    """
+
+    aligned: AlignedCurves
+    names: list
+    template: int | None
+    design: pd.DataFrame
+    of_groups: GroupsOfPeople
+    frames: np.ndarray
+    seconds: np.ndarray | None
+    signals: list
+
+    @classmethod
+    def of(cls, X, aligned, frame_rate, groups, people, covariate):
+        """Those of the arguments of `write_report`."""
+        reached, n = aligned.reached, len(aligned.curves)
+        of_groups = GroupsOfPeople.of(groups, people, n)
+        design = {}
+        if groups is not None:
+            design["group"] = names_of_groups(groups, n)
+        if people is not None:
+            design["person"] = names_of_groups(people, n, name="people")
+        if covariate is not None:
+            design["covariate"] = np.asarray(covariate, dtype=float)
+        frames = np.array([len(x) for x in reached.performances])
+        rates = rates_of(X, frame_rate)
+        units = dict(zip(aligned.names, aligned.units, strict=True))
+        return cls(
+            aligned,
+            list(map(as_text, labels_of_input(X, reached.performances)[0])),
+            index_of_pattern(reached.synchronizer, reached.performances),
+            pd.DataFrame(design, index=range(n)),
+            of_groups,
+            frames,
+            None if rates is None else (frames - 1) / np.ravel(as_frame_rates(rates, n)),
+            labels_of_signals(aligned.names, units),
+        )
+
+    @property
+    def headings(self):
+        """The signals in one line."""
+        return [label.replace("\n", " ") for label in self.signals]
+
+    @property
+    def reasons(self):
+        """Why trials are doubtful, None for those that are not; None if the match tells nothing."""
+        match = self.aligned.match
+        return None if match.intervals is None else match.reasons
+
+    @property
+    def columns(self):
+        """Names of the columns of timing: the mean, the largest, and where that is."""
+        unit = UNITS[self.aligned.unit]
+        return f"mean absolute offset ({unit})", f"largest offset ({unit})", f"at ({unit})"
+
+    def table(self):
+        """A row a trial: what is known of it, its length and its timing."""
+        table = self.design.copy()
+        table.insert(0, "trial", self.names)
+        table["frames"] = self.frames
+        if self.seconds is not None:
+            table["seconds"] = self.seconds
+        offsets, (mean, largest, place) = self.aligned.offsets, self.columns
+        at = first_largest(np.abs(offsets), axis=1)
+        table[mean] = np.abs(offsets).mean(axis=1)
+        table[largest], table[place] = offsets[np.arange(len(offsets)), at], self.aligned.clock[at]
+        table["template"] = np.arange(len(table)) == self.template
+        if self.reasons is not None:
+            table["doubtful"] = self.aligned.match.doubtful
+        return table
+
+    def _members(self):
+        """For each group the beginning of its row in a table, its people, and its trials."""
+        for label, maker in zip(self.of_groups.labels, self.of_groups.makers, strict=True):
+            yield {"group": label} if "group" in self.design else {}, maker, maker.any(axis=0)
+
+    def groups(self):
+        """A row a group: its people, its trials, and how long these are."""
+        lengths = self.frames if self.seconds is None else self.seconds
+        unit = "frames" if self.seconds is None else "seconds"
+        rows = []
+        for row, maker, members in self._members():
+            if "person" in self.design:
+                row["people"] = len(maker)
+            row["trials"], of_group = members.sum(), lengths[members]
+            spread = of_group.std(ddof=1) if len(of_group) > 1 else np.nan
+            rows.append(row | {f"{unit}, mean": of_group.mean(), f"{unit}, SD": spread})
+        return pd.DataFrame(rows)
+
+    def timing(self):
+        """A row a group: the offsets of its trials."""
+        table, rows, (mean, largest, at) = self.table(), [], self.columns
+        for row, _, members in self._members():
+            of_group = table[members]
+            first = of_group.loc[of_group[largest].abs().idxmax()]
+            row |= {mean: of_group[mean].mean(), largest: first[largest], at: first[at]}
+            rows.append(row | {"of trial": first["trial"]})
+        return pd.DataFrame(rows)
+
+    def spread(self):
+        """A row a signal: how much trials differ, time-normalised and aligned."""
+        even, curves = (
+            np.sqrt(x.var(axis=0).mean(axis=0)) for x in (self.aligned.even, self.aligned.curves)
+        )
+        table = {"signal": self.headings, "time-normalised": even, "aligned": curves}
+        percents = 100 * np.divide(curves, even, out=np.full_like(even, np.nan), where=even > 0)
+        return pd.DataFrame(table | {"left (%)": percents})
+
+    @property
+    def step(self):
+        """Every so many frames are in the tables that have a row a frame."""
+        n, n_frames, width = self.aligned.curves.shape
+        return -(-n * n_frames * (width + 4) // MOST_NUMBERS)
+
+    def by_frame(self):
+        """Two tables with a row a trial and frame: the timing, and the aligned curves."""
+        match, clock = self.aligned.match, self.aligned.clock
+        frames = np.arange(0, len(clock), self.step)
+        n, unit = len(match.times), UNITS[self.aligned.unit]
+        index = self.design.loc[np.repeat(range(n), len(frames))].reset_index(drop=True)
+        index.insert(0, "trial", np.repeat(self.names, len(frames)))
+        index["frame of the template"] = np.tile(frames, n)
+        if self.aligned.unit != "frames":
+            index[f"time of the template ({unit})"] = np.tile(clock[frames], n)
+        timing = index.copy()
+        timing[f"offset ({unit})"] = self.aligned.offsets[:, frames].ravel()
+        timing["frame of the trial"] = match.frames(self.frames)[:, frames].ravel()
+        timing["rate"] = match.rates[:, frames].ravel()
+        curves = self.aligned.curves[:, frames].reshape(n * len(frames), -1)
+        return timing, pd.concat([index, pd.DataFrame(curves, columns=self.headings)], axis=1)
 
 
 # -- figures ---------------------------------------------------------------------------------------
@@ -379,19 +515,20 @@ def draw_signals(trials, shown):
         The signals.
     """
     aligned, template = trials.aligned, trials.template
-    n_frames = len(aligned.clock)
+    n_frames, rate = len(aligned.clock), clock_rate(aligned.clock)
+    lengths, keyframes = [n_frames] * len(aligned.even), _keyframes_of(aligned)
+    after = aligned.curves[:, :, shown]
+    is_mean = template is None
     display = SynchronizationDisplay(
-        aligned.even[:, :, shown],
-        aligned.curves[:, :, shown],
+        list(aligned.even[:, :, shown]),
+        after,
         aligned.match,
-        TimeAxis(aligned.unit, n_frames, [n_frames] * len(aligned.even), clock_rate(aligned.clock)),
-        feature_names=[trials.signals[i] for i in shown],
-        pattern=None if template is None else aligned.curves[template][:, shown],
-        groups=trials.design.get("group"),
-        pattern_keyframes=_keyframes_of(aligned),
+        TimeAxis(aligned.unit, n_frames, lengths, rate, keyframes=keyframes),
+        [trials.signals[i] for i in shown],
+        after.mean(axis=0) if is_mean else after[template],
+        ("time-normalised", "their mean" if is_mean else "the template"),
+        list(map(str, trials.design["group"])) if "group" in trials.design else None,
     ).plot(warps=False)
-    left = display.axes_[0]
-    left.title.set_text(left.get_title().replace("as recorded", "time-normalised"))
     display.axes_[-2].set_xlabel(display.axes_[-1].get_xlabel())
     return display.figure_
 
@@ -400,8 +537,10 @@ def draw_offsets(trials):
     """The offsets of all trials, and the mean of each group."""
     aligned = trials.aligned
     offsets, clock = aligned.offsets, aligned.clock
-    axis_of_time = TimeAxis.of_clock(aligned.unit, clock)
-    figure, (axis,) = panels(None, [(0, 0)], 1, 1, (WIDTH, 3.4))
+    time = TimeAxis(
+        aligned.unit, len(clock), None, clock_rate(clock), keyframes=_keyframes_of(aligned)
+    )
+    figure, (axis,) = panels(None, [(0, 0)], (1, 1), (WIDTH, 3.4))
     names = list(trials.design.get("group", [""] * len(offsets)))
     styles = group_styles(names)
     colors = [styles[name][0] for name in names]
@@ -412,11 +551,9 @@ def draw_offsets(trials):
     ]
     axis.axhline(0, color="0.4", linewidth=0.8, zorder=0)
     axis.set_xlim(clock[0], clock[-1])
-    axis.set_xlabel(axis_of_time.label)
-    axis.set_ylabel(offset_label(aligned.unit))
-    keyframes = _keyframes_of(aligned)
-    if keyframes is not None:
-        draw_keyframes(axis, axis_of_time.convert(keyframes.to_numpy()), keyframes.index)
+    axis.set_xlabel(time.label)
+    axis.set_ylabel(f"later than\nthe template ({UNITS[aligned.unit]})")
+    time.draw_keyframes([axis], axis)
     labels = [f"mean of {name}" for name in styles] if "group" in trials.design else ["their mean"]
     legend_above([axis], means, labels)
     return figure

@@ -1,10 +1,7 @@
 """Animations: the player in a notebook needs no network and draws each picture once."""
 
-import gc
 import re
-import warnings
 
-import matplotlib.pyplot as plt
 import pytest
 from sklearn_motionsync.display import SkeletonDisplay
 
@@ -26,21 +23,6 @@ def test_every_button_has_an_icon_and_a_title(player):
     pictures = [picture.strip() for _, picture in buttons]
     assert all(re.fullmatch(r"<svg .*<path .*</svg>", p) for p in pictures), pictures
     assert len(set(pictures)) == 9
-
-
-def test_closing_the_figure_prevents_the_warning(bending):
-    display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        for closes in (False, True):
-            animation = display.animate(seconds=0.2, fps=10)
-            if closes:
-                plt.close()
-                # It has the number of the closed one.
-                assert plt.figure().number == display.figure_.number
-            del animation
-            gc.collect()
-            assert len(caught) == 1, closes
 
 
 def test_saving_computes_the_layout_once_and_draws_each_picture_once(bending, tmp_path):

@@ -66,8 +66,6 @@ def test_from_estimator_refuses(segmenter):
     ):
         with pytest.raises(ValueError, match=message):
             CycleDisplay.from_estimator(segmenter, GAIT.data, **change)
-    display = CycleDisplay([1, 0, 0.5, 0], [2], np.zeros(5), [0, 2], period=2.1).plot()
-    assert repr(display).startswith("CycleDisplay(5 frames")
 
 
 def test_a_table_tells_its_frame_rate(segmenter):

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from sklearn_motionsync.display.drawing import COLORS, group_styles, parts_outside, pyplot
+from sklearn_motionsync.display.base import COLORS, group_styles, parts_outside, pyplot
 
 # Colours as seen without one kind of cones: Machado, Oliveira and Fernandes, "A
 # physiologically-based model for simulation of color vision deficiency", 2009, severity 1.

@@ -70,31 +70,8 @@ def test_key_frames_that_trials_lack_are_lines_without_names(sync):
     np.testing.assert_allclose(places(display.keyframes_[0]), sync.keyframes_)
     assert display.own_keyframes_ == []
     assert texts(display.axes_[-1]) == []
-    display.plot(keyframe_lines=False)
-    assert display.keyframes_ == []
-    none = SynchronizationDisplay.from_estimator(sync, X, keyframes=K, keyframe_lines=False)
-    assert none.keyframes_ == none.own_keyframes_ == []
     plain = DenseSynchronizer(61).fit(X)
     assert SynchronizationDisplay.from_estimator(plain, X, features=0).keyframes_ == []
-    plt.close("all")
-
-
-def test_key_frames_of_warps_that_are_known_already(sync):
-    times = sync.match(X, keyframes=K).times
-    given = {"keyframes": K, "pattern_keyframes": pd.Series(sync.keyframes_, index=["a$", "b"])}
-    display = SynchronizationDisplay.from_predictions(X, times, features=0, **given)
-    expected = SynchronizationDisplay.from_estimator(sync, X, keyframes=K, features=0)
-    for lines, others in zip(display.keyframes_, expected.keyframes_, strict=True):
-        assert places(lines) == places(others)
-    (ticks,), (others,) = display.own_keyframes_, expected.own_keyframes_
-    np.testing.assert_allclose(ticks.get_segments(), others.get_segments())
-    assert texts(display.axes_[-1]) == [r"a\$", "b"]
-    display = SynchronizationDisplay.from_predictions(X, times, pattern_keyframes=[5, np.nan])
-    assert places(display.keyframes_[0]) == [5]
-    with pytest.raises(ValueError, match=r"pattern_keyframes must be .* from 0 to 60; got 61"):
-        SynchronizationDisplay.from_predictions(X, times, pattern_keyframes=[5, 61])
-    with pytest.raises(ValueError, match=r"shape \(6, n_keyframes\), .*; got \(5, 2\)"):
-        SynchronizationDisplay.from_predictions(X, times, keyframes=K[:5])
     plt.close("all")
 
 
@@ -111,7 +88,6 @@ def test_the_model_of_a_pipeline_shows_them(sync):
     assert [places(lines) for lines in without.keyframes_] == [
         places(lines) for lines in display.keyframes_
     ]
-    assert ActionModelDisplay.from_estimator(pipe, keyframe_lines=False).keyframes_ == []
     assert ActionModelDisplay.from_estimator(pipe[1]).keyframes_ == []
     plt.close("all")
 
@@ -124,7 +100,6 @@ def test_the_trellis_shows_those_of_its_trial(sync):
     # The warp goes through them.
     met = np.interp(at + sync.keyframes_, np.arange(61) + display.warp, np.arange(61))
     np.testing.assert_allclose(met, sync.keyframes_, atol=1e-6)
-    assert display.plot(keyframe_points=False).keyframes_ is None
     assert TrellisDisplay.from_estimator(sync, X, performance=1, keyframes=K).keyframes_ is None
     assert TrellisDisplay.from_estimator(sync, X, performance=2).keyframes_ is None
     plt.close("all")

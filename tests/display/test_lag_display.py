@@ -32,16 +32,15 @@ def test_map_shows_the_mean_and_hatches_intervals_around_zero(lags):
     assert max(path.vertices[:, 0].max() for path in leg) > 15
     assert all(patch.get_hatch() for patch in display.unsure_)
     title = "2 parts behind the rest of the body, 12 trials of 4 people"
-    assert display.map_ax_.get_title() == title
-    names = [label.get_text() for label in display.map_ax_.get_yticklabels()]
+    assert display.axes_[0].get_title() == title
+    names = [label.get_text() for label in display.axes_[0].get_yticklabels()]
     icc = lags.summary()["icc"]
     assert names == [f"arm\nICC {icc['arm']:.2f}", f"leg\nICC {icc['leg']:.2f}"]
 
 
 def test_curves_show_mean_interval_and_standard_deviation(lags):
-    display = LagDisplay.from_predictions(lags, colorbar=False, xlabel="% gait cycle")
-    assert {axis.get_xlabel() for axis in (display.map_ax_, *display.axes_)} == {"% gait cycle"}
-    assert display.colorbar_ is None
+    display = LagDisplay.from_predictions(lags, xlabel="% gait cycle")
+    assert {axis.get_xlabel() for axis in display.axes_} == {"% gait cycle"}
     for i, part in enumerate(["arm", "leg"]):
         table = lags.over_time().loc[part]
         np.testing.assert_array_equal(display.means_[i].get_ydata(), table["mean"])
@@ -53,14 +52,14 @@ def test_curves_show_mean_interval_and_standard_deviation(lags):
         assert (heights.min(), heights.max()) == pytest.approx(
             (table["low"].min(), table["high"].max())
         )
-    assert "people" in display.axes_[0].get_legend().get_texts()[1].get_text()
+    assert "people" in display.axes_[1].get_legend().get_texts()[1].get_text()
 
 
 def test_a_single_performance_has_no_interval(lags):
     display = LagDisplay.from_predictions(Lags(lags.values[:1], lags.parts, "percent"))
-    assert display.map_ax_.get_title() == "2 parts behind the rest of the body, 1 trial"
+    assert display.axes_[0].get_title() == "2 parts behind the rest of the body, 1 trial"
     assert display.unsure_[0].get_paths()
-    assert display.map_ax_.get_xlim() == (0, 100)
+    assert display.axes_[0].get_xlim() == (0, 100)
 
 
 def test_from_estimator_of_a_pipeline_on_axes_of_the_user():
@@ -73,7 +72,7 @@ def test_from_estimator_of_a_pipeline_on_axes_of_the_user():
     X = pipe[:-1].transform(bunch.data)
     np.testing.assert_array_equal(display.lags.values, sync.lags(X).values)
     assert display.figure_ is ax.figure
-    assert [a.get_title() for a in display.axes_] == display.lags.parts
+    assert [a.get_title() for a in display.axes_[1:]] == display.lags.parts
     tables = [pd.DataFrame(x, columns=bunch.skeleton.column_names) for x in bunch.data]
     for x in tables:
         x.attrs["frame_rate"] = 50.0

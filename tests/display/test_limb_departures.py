@@ -266,18 +266,6 @@ def test_from_departures_refuses_pipelines_without_limbs(bunch, pipe):
         SkeletonDisplay.from_departures(pipe, bunch.data, keyframes=bunch.keyframes)
 
 
-def test_real_subject_is_accepted_unless_standing_still(real_bends_of_three):
-    """A model of the bends of three actors sees the fourth bend and stand still."""
-    pipe, new = real_bends_of_three
-    still = np.repeat(new[:1], len(new), axis=0)
-    good, bad = (SkeletonDisplay.from_departures(pipe, [new, still], performance=i) for i in (0, 1))
-    assert "is accepted" in good.heading
-    assert "is not accepted" in bad.heading
-    assert all(bad.marked)
-    assert "Rare: nothing" in good.heading
-    assert any("neck" in marked_joints(bad, panel) for panel in (2, 3)), "upright at its height"
-
-
 def test_heading_tells_departures_outside_the_aspace(bunch):
     """Neither of the two components moves the neck sideways."""
     steps = DirectionCosines(bunch.skeleton), ASpace(2), LinearSynchronizer(40), ActionModel()
@@ -292,12 +280,3 @@ def test_heading_tells_departures_outside_the_aspace(bunch):
         pipe, [tilted.reshape(-1, 45), bunch.data[3]], performance=1
     )
     assert "Trial 1 is accepted.\n" in plain.heading
-
-
-@pytest.fixture(scope="module")
-def real_bends_of_three(bends):
-    others = bends.actor != "bk"
-    people = [x for x, other in zip(bends.data, others, strict=True) if other]
-    steps = DirectionCosines(bends.skeleton), ASpace(0.95), DenseSynchronizer(100), ActionModel()
-    pipe = make_pipeline(*steps).fit(people, actionmodel__groups=bends.actor[others])
-    return pipe, bends.data[int(np.flatnonzero(~others)[0])]

@@ -32,7 +32,7 @@ def widths(bars):
 
 
 def labels(display):
-    return [label.get_text() for label in display.ax_.get_yticklabels()]
+    return [label.get_text() for label in display.axes_[0].get_yticklabels()]
 
 
 def test_bars_agree_with_the_metric(noisy):
@@ -54,9 +54,9 @@ def test_noise_has_a_long_light_bar_and_a_short_dark_one(noisy):
     assert abs(dark[0]) < 0.1 * light[0]
     # The light bars are behind; the first row is on top.
     assert display.energy_[0].get_height() > display.share_[0].get_height()
-    assert display.ax_.yaxis_inverted()
-    assert "share of what is compared" in display.ax_.get_xlabel()
-    assert len(display.ax_.get_legend().get_texts()) == 2
+    assert display.axes_[0].yaxis_inverted()
+    assert "share of what is compared" in display.axes_[0].get_xlabel()
+    assert len(display.axes_[0].get_legend().get_texts()) == 2
 
 
 def test_the_smallest_of_many_features_are_summed(noisy):
@@ -96,7 +96,7 @@ def test_rows_have_the_names_of_features_and_columns():
 def test_axes_of_the_user_and_new_plot(noisy):
     figure, axes = plt.subplots(1, 2)
     display = MetricDisplay.from_estimator(noisy, features=[0, 37], ax=axes[1])
-    assert display.ax_ is axes[1]
+    assert display.axes_ == [axes[1]]
     assert display.figure_ is figure
     assert display.plot() is display
     assert display.figure_ is not figure

@@ -1,4 +1,4 @@
-"""ActionModelDisplay: its artists agree with the model, also of groups and in any unit."""
+"""ActionModelDisplay: its artists agree with the model, in any unit."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -7,12 +7,16 @@ from artists import segments, texts, ys
 from matplotlib.colors import to_rgba
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
-from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+)
 from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay
-from sklearn_motionsync.display.drawing import group_styles
+from sklearn_motionsync.display.base import group_styles
 
-GROUPS = ["young", "old", "young", "old", "young", "old", "young", "old", "one"]
-PEOPLE = ["a", "b", "c", "d", "a", "b", "e", "d", "f"]
 P = 30
 
 
@@ -39,14 +43,13 @@ def test_model_in_features_of_postures(bunch, pipe):
     names = list(pipe[0].get_feature_names_out())
     chosen = [names.index("left_leg_y"), names.index("pelvis_height")]
     postures = pipe[1].inverse_transform(pipe[-1].mean_)[:, chosen]
-    (drawn,) = display.groups
-    np.testing.assert_allclose(drawn.mean, postures, atol=1e-12)
+    np.testing.assert_allclose(display.mean, postures, atol=1e-12)
     assert display.performances_ == display.departures_ == []
     # The variance is that of postures: dimensions of the aSpace are correlated.
     postures = pipe[1].inverse_transform(pipe[:3].transform(bunch.data))[:, :, chosen]
     std = postures.std(axis=0)
-    np.testing.assert_allclose(drawn.upper - drawn.mean, 3 * std, atol=1e-9)
-    np.testing.assert_allclose(drawn.mean - drawn.lower, 3 * std, atol=1e-9)
+    np.testing.assert_allclose(display.upper - display.mean, 3 * std, atol=1e-9)
+    np.testing.assert_allclose(display.mean - display.lower, 3 * std, atol=1e-9)
 
 
 def legend_of(display):
@@ -78,15 +81,14 @@ def test_each_band_has_its_bounds_and_legend(bunch, pipe):
     }
     for band, ((lower, upper), holds, label) in expected.items():
         display = ActionModelDisplay.from_estimator(model, features=[1], band=band)
-        (drawn,) = display.groups
-        np.testing.assert_array_equal(drawn.lower, lower[:, [1]])
-        np.testing.assert_array_equal(drawn.upper, upper[:, [1]])
+        np.testing.assert_array_equal(display.lower, lower[:, [1]])
+        np.testing.assert_array_equal(display.upper, upper[:, [1]])
         title, text = legend_of(display)
         assert holds in title
         assert text == label
     for features in ("torso_z", "aspace0"):
         wide, narrow = (
-            ActionModelDisplay.from_estimator(pipe, features=features, band=band).groups[0]
+            ActionModelDisplay.from_estimator(pipe, features=features, band=band)
             for band in ("performances", "mean")
         )
         assert (wide.upper > narrow.upper).all()
@@ -98,17 +100,15 @@ def test_departures_are_the_parts_outside_the_band(bunch, pipe, band):
     still = np.repeat(bunch.data[0][:1], 40, axis=0)
     people, features = [*bunch.data[:3], still], ["pelvis_height", "torso_z"]
     display = ActionModelDisplay.from_estimator(pipe, people, features=features, band=band)
-    (drawn,) = display.groups
-    outside = (drawn.performances < drawn.lower) | (drawn.performances > drawn.upper)
+    outside = (display.performances < display.lower) | (display.performances > display.upper)
     assert outside[3].any()
     assert legend_of(display)[2] == outside.any(axis=(1, 2)).sum()
     for i, departures in enumerate(display.departures_):
         assert tuple(departures.get_colors()[0]) != tuple(display.performances_[i].get_colors()[0])
         pieces = {(x, y) for piece in segments(departures) for x, y in piece.round(9) if x % 1 == 0}
         seen = np.argwhere(outside[:, :, i])
-        assert pieces == {(p, drawn.performances[n, p, i].round(9)) for n, p in seen}
-    for options in ({"departures": False, "band": band}, {"band": "mean"}):
-        assert ActionModelDisplay.from_estimator(pipe, people, **options).departures_ == []
+        assert pieces == {(p, display.performances[n, p, i].round(9)) for n, p in seen}
+    assert ActionModelDisplay.from_estimator(pipe, people, band="mean").departures_ == []
 
 
 def test_rounding_is_no_departure():
@@ -132,82 +132,12 @@ def test_model_without_a_pipeline(bunch, pipe):
     warped = pipe[:3].transform(bunch.data)
     model = ActionModel(n_std=2).fit(warped)
     display = ActionModelDisplay.from_estimator(model, warped[:2])
-    assert display.feature_names == ["x0", "x1", "x2"]
-    assert display.groups[0].performances.shape == (2, 30, 3)
+    assert display.ylabels == ["x0", "x1", "x2"]
+    assert display.performances.shape == (2, 30, 3)
     with pytest.raises(ValueError, match="no feature 'pelvis_height'"):
         ActionModelDisplay.from_estimator(model, features="pelvis_height")
     with pytest.raises(ValueError, match="no feature 'knee'; there are 37: pelvis_height"):
         ActionModelDisplay.from_estimator(pipe, features=["knee"])
-
-
-@pytest.mark.parametrize("band", ["points", "performances", "mean"])
-def test_mean_and_band_of_each_group_are_those_of_its_own_model(bunch, pipe, band):
-    display = ActionModelDisplay.from_estimator(
-        pipe, bunch.data, groups=GROUPS, people=PEOPLE, band=band, features=[1, 0]
-    )
-    warped = pipe[:3].transform(bunch.data)
-    for k, name in enumerate(["young", "old"]):
-        of = [i for i, group in enumerate(GROUPS) if group == name]
-        people = None if band == "points" else [PEOPLE[i] for i in of]
-        model = ActionModel().fit(warped[of], groups=people)
-        lower, upper = {
-            "points": model.envelope(),
-            "performances": model.envelope(simultaneous=True),
-            "mean": model.mean_envelope(random_state=0),
-        }[band]
-        for drawn, expected in (
-            (display.groups[k].mean, model.mean_),
-            (display.groups[k].lower, lower),
-            (display.groups[k].upper, upper),
-        ):
-            np.testing.assert_allclose(drawn, expected[:, [1, 0]], atol=1e-12)
-        # The means are sorted by feature, then by group.
-        np.testing.assert_array_equal(
-            display.mean_[3 + k].get_ydata(), display.groups[k].mean[:, 1]
-        )
-    np.testing.assert_array_equal(display.groups[2].mean, warped[8][:, [1, 0]])
-    assert np.isnan(display.groups[2].lower).all()
-    assert len(display.mean_) == len(display.performances_) == 6
-    assert len(display.envelope_) == 4
-    assert texts(display.axes_[0])[:3] == [
-        "young: 4 trials of 3 people",
-        "old: 4 trials of 2 people",
-        "one: 1 trial of 1 person, no band",
-    ]
-
-
-def test_default_band_of_groups_is_that_of_performances(bunch, pipe):
-    alike = ActionModelDisplay.from_estimator(pipe, bunch.data, groups=["all"] * 9)
-    assert "95 % of new people's trials" in legend_of(alike)[0]
-    plain = ActionModelDisplay.from_estimator(
-        pipe[-1], pipe[:3].transform(bunch.data), band="performances"
-    )
-    np.testing.assert_allclose(alike.groups[0].upper, plain.groups[0].upper)
-    assert "single poses" in legend_of(ActionModelDisplay.from_estimator(pipe))[0]
-
-
-def test_a_group_of_one_subject_has_no_band_of_performances(bunch, pipe):
-    groups, people = ["a"] * 5 + ["b"] * 4, [1, 2, 3, 4, 5, 6, 6, 6, 6]
-    given = {"groups": groups, "people": people, "features": [0]}
-    display = ActionModelDisplay.from_estimator(pipe, bunch.data, **given)
-    assert "b: 4 trials of 1 person, no band" in texts(display.axes_[0])
-    display = ActionModelDisplay.from_estimator(pipe, bunch.data, band="points", **given)
-    assert "b: 4 trials of 1 person" in texts(display.axes_[0])
-
-
-def test_legend_counts_departures_from_the_band_of_the_own_group(bunch, pipe):
-    X, groups = [*bunch.data, bunch.data[0][::-1]], [*GROUPS[:8], "old", "young"]
-    display = ActionModelDisplay.from_estimator(
-        pipe, X, groups=groups, band="points", features=["torso_z", "pelvis_height"]
-    )
-    count = 0
-    for drawn, name in zip(display.groups, ["young", "old"], strict=True):
-        assert len(drawn.performances) == groups.count(name)
-        np.testing.assert_allclose(drawn.mean, drawn.performances.mean(axis=0))
-        out = (drawn.performances > drawn.upper) | (drawn.performances < drawn.lower)
-        count += out.any(axis=(1, 2)).sum()
-    label = f"outside the band of its group: {count} of them"
-    assert label in texts(display.axes_[0])
 
 
 @pytest.mark.parametrize(
@@ -215,9 +145,7 @@ def test_legend_counts_departures_from_the_band_of_the_own_group(bunch, pipe):
     [
         ({"band": "all"}, ValueError, "band must be one of .*got 'all'"),
         ({"band": ["mean"]}, ValueError, "band must be one of"),
-        ({"people": PEOPLE}, TypeError, "takes people along with groups only"),
-        ({"groups": GROUPS, "X": None}, TypeError, "takes groups along with performances X"),
-        ({"people": PEOPLE, "X": None}, TypeError, "takes people along with performances X"),
+        ({"keyframes": [[3]], "X": None}, TypeError, "takes keyframes along with performances X"),
         ({"unit": "ms"}, ValueError, "unit must be one of .*got 'ms'"),
         ({"unit": "seconds"}, ValueError, "needs frame_rate"),
         ({"unit": "seconds", "frame_rate": 0}, ValueError, "frame_rate must be one number above"),
@@ -231,14 +159,13 @@ def test_action_model_display_refuses(bunch, pipe, arguments, error, message):
 
 def test_many_groups_differ_in_color_or_line_style(bunch, pipe):
     names = [f"_${i}" for i in range(9)]
-    display = ActionModelDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
-    assert len({(line.get_color().__str__(), line.get_linestyle()) for line in display.mean_}) == 9
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
+    (means,) = display.group_means_
+    assert len({(str(line.get_color()), line.get_linestyle()) for line in means}) == 9
+    assert len({line.get_linestyle() for line in means}) == 4
     display.figure_.canvas.draw()
-    assert [text.strip().replace("\\", "") for text in texts(display.axes_[0])] == [
-        f"{name}: 1 trial, no band" for name in names
-    ]
-    before = SynchronizationDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
-    assert len({line.get_linestyle() for line in before.group_means_[0]}) == 4
+    shown = [text.strip().replace("\\", "") for text in texts(display.axes_[0])]
+    assert shown == names
     # Black is the pattern.
     for count in (6, 7, 20):
         colors = {to_rgba(color) for color, _ in group_styles(range(count)).values()}
@@ -246,14 +173,13 @@ def test_many_groups_differ_in_color_or_line_style(bunch, pipe):
         assert to_rgba("black") not in colors
 
 
-@pytest.mark.parametrize("groups", [None, GROUPS])
-def test_units_of_the_action_model_display(bunch, pipe, groups):
+def test_units_of_the_action_model_display(bunch, pipe):
     still = np.repeat(bunch.data[0][:1], 40, axis=0)
     X = [*bunch.data[:8], still]
     median = np.median([len(x) - 1 for x in X]) / 50
     for unit, last in (("frames", P - 1), ("percent", 100), ("seconds", median)):
         display = ActionModelDisplay.from_estimator(
-            pipe, X, features=[0], unit=unit, frame_rate=50, groups=groups, band="points"
+            pipe, X, features=[0], unit=unit, frame_rate=50, band="points"
         )
         np.testing.assert_allclose(display.mean_[0].get_xdata(), np.linspace(0, last, P))
         for artist in (*display.performances_, *display.departures_):
@@ -266,13 +192,13 @@ def test_units_of_the_action_model_display(bunch, pipe, groups):
 
 def test_a_model_of_univariate_rows_in_seconds():
     rows = np.random.default_rng(0).normal(size=(6, 21))
-    given = {"unit": "seconds", "frame_rate": 10, "groups": list("aabbab")}
+    given = {"unit": "seconds", "frame_rate": 10}
     display = ActionModelDisplay.from_estimator(ActionModel().fit(rows), rows, **given)
-    assert (display.feature_names, texts(display.axes_[0])[0]) == (["x0"], "a: 3 trials")
+    assert (display.ylabels, texts(display.axes_[0])[1]) == (["x0"], "6 trials")
     np.testing.assert_allclose(display.mean_[0].get_xdata(), np.arange(21) / 10)
 
 
-@pytest.mark.parametrize("kind", ["model", "model of groups", "synchronization"])
+@pytest.mark.parametrize("kind", ["model", "synchronization"])
 @pytest.mark.parametrize(
     ("size", "layout"),
     [
@@ -287,10 +213,7 @@ def test_legends_are_above_the_panels(bunch, pipe, layout, size, kind):
             pipe, bunch.data, groups=[f"group {g}" for g in range(9)], features=[0], ax=axes
         )
     else:
-        groups = GROUPS if "groups" in kind else None
-        display = ActionModelDisplay.from_estimator(
-            pipe, bunch.data, groups=groups, features=[0], ax=axes
-        )
+        display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=[0], ax=axes)
     display.figure_.canvas.draw()
     box = display.axes_[0].get_legend().get_window_extent()
     for axis in display.axes_:
@@ -308,14 +231,13 @@ def test_legend_of_many_groups_fits_on_small_axes(layout):
     rng = np.random.default_rng(0)
     X = np.sin(np.linspace(0, 3, 40)) + rng.normal(size=(16, 1))
     axes = plt.figure(figsize=(4, 3), layout=layout).add_subplot()
-    display = ActionModelDisplay.from_estimator(
-        ActionModel().fit(X), X, groups=[f"group {i // 2}" for i in range(16)], ax=axes
-    )
+    sync, groups = LinearSynchronizer(20).fit(X), [f"group {i // 2}" for i in range(16)]
+    display = SynchronizationDisplay.from_estimator(sync, X, groups=groups, warps=False, ax=axes)
     display.figure_.canvas.draw()
     legend = display.axes_[0].get_legend()
     assert sum(text.startswith("group") for text in texts(display.axes_[0])) == 8
     assert legend.get_window_extent().y1 <= display.figure_.bbox.height
-    assert display.axes_[0].get_window_extent().height > 100
+    assert display.axes_[0].get_window_extent().height > 60
 
 
 def test_plotting_again_keeps_the_height_of_the_axes(bunch, pipe):

@@ -30,12 +30,15 @@ def test_lines_and_bands_are_those_of_the_comparison(found):
     display = NormDisplay.from_comparison(found, subject, units={"x1": "degrees"})
     assert len(display.axes_) == 5
     for k in range(5):
-        np.testing.assert_array_equal(display.subject_[k].get_ydata(), found.curves[i, :, k])
-        np.testing.assert_array_equal(display.mean_[k].get_ydata(), found.mean[:, k])
+        # The offset is counted from that of the norm, which is flat.
+        mean = found.mean[:, k] * (k < 4)
+        curve = found.curves[i, :, k] - found.mean[:, k] * (k == 4)
+        np.testing.assert_array_equal(display.subject_[k].get_ydata(), curve)
+        np.testing.assert_array_equal(display.mean_[k].get_ydata(), mean)
         reach = found.limits[i, k] * found.std[:, k]
         heights = display.bands_[k].get_paths()[0].vertices[:, 1]
-        assert heights.max() == pytest.approx((found.mean[:, k] + reach).max())
-        assert heights.min() == pytest.approx((found.mean[:, k] - reach).min())
+        assert heights.max() == pytest.approx((mean + reach).max())
+        assert heights.min() == pytest.approx((mean - reach).min())
         # Violet where a row of the table is, and nowhere else.
         rows = found.departures[found.departures["subject"] == subject]
         rows = rows[rows["feature"] == found.features[k]]

@@ -89,9 +89,6 @@ DRAWN = {
     "model": lambda pipe, postures: display.ActionModelDisplay.from_estimator(
         pipe, BUNCH.data, band="performances"
     ),
-    "model of groups": lambda pipe, postures: display.ActionModelDisplay.from_estimator(
-        pipe, BUNCH.data, groups=["young"] * 4 + ["old"] * 4
-    ),
     "postures": lambda pipe, postures: display.SkeletonDisplay.from_positions(
         BUNCH.data[0], BUNCH.skeleton
     ),

@@ -40,7 +40,11 @@ def test_features_before_and_after_and_warps(bunch, pipe):
         np.testing.assert_array_equal(line.get_ydata(), synchronizer.pattern_[:, feature])
         assert display.axes_[2 * row].get_ylabel() == f"aspace{feature}"
         assert line.get_zorder() >= display.after_[row].get_zorder()
-    np.testing.assert_array_equal(ys(display.warps_), synchronizer.match(points).times)
+    offsets = synchronizer.match(points).offsets
+    for drawn, offset in zip(ys(display.offsets_), offsets, strict=True):
+        mean = sum(offsets) / len(offsets)
+        np.testing.assert_allclose(drawn, offset - mean, atol=1e-12)
+    assert display.axes_[4].get_ylabel() == "later than\nthe mean (frames)"
     low, high = display.axes_[0].get_ylim()
     assert low <= min(x[:, 2].min() for x in points) <= max(x[:, 2].max() for x in points) <= high
 
@@ -65,7 +69,7 @@ def test_the_mean_of_each_group_is_in_front(bunch, pipe):
             of = np.array(GROUPS) == name
             np.testing.assert_allclose(line.get_ydata(), warped[of][:, :, feature].mean(axis=0))
             assert line.get_zorder() > display.after_[row].get_zorder()
-            for artist in (display.before_[row], display.after_[row], display.warps_):
+            for artist in (display.before_[row], display.after_[row], display.offsets_):
                 colors = artist.get_colors()[of][:, :3]
                 assert (colors == to_rgba(line.get_color())[:3]).all()
     assert texts(display.axes_[0]) == ["young", "old", "one"]
@@ -83,7 +87,7 @@ def test_univariate_rows_and_tables_are_accepted(bunch):
             SynchronizationDisplay.from_estimator(linear, X, features="hip"),
             SynchronizationDisplay.from_predictions(X, times, features="hip"),
         ):
-            assert display.feature_names == ["hip"]
+            assert display.ylabels == ["hip"]
             np.testing.assert_array_equal(display.before[2][:, 0], frames[2]["hip"])
             np.testing.assert_array_equal(display.after[0, :, 0], linear.transform(frames)[0, :, 1])
 
@@ -96,7 +100,7 @@ def test_pandas_output_is_drawn_as_arrays_are(bunch, pipe):
     for features in (None, ["pelvis_height"]):
         one = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features)
         other = ActionModelDisplay.from_estimator(framed, bunch.data, features=features)
-        found, expected = (each.groups[0].performances for each in (other, one))
+        found, expected = other.performances, one.performances
         np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
@@ -104,24 +108,19 @@ def test_from_predictions_draws_what_from_estimator_does(bunch, pipe):
     points = pipe[:2].transform(bunch.data)
     one = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=1)
     times = pipe[2].match(points).times
-    other = SynchronizationDisplay.from_predictions(
-        points, times, pattern=pipe[2].pattern_, features=1
-    )
+    other = SynchronizationDisplay.from_predictions(points, times, features=1)
     np.testing.assert_array_equal(ys(one.after_[0]), ys(other.after_[0]))
-    np.testing.assert_array_equal(ys(one.warps_), ys(other.warps_))
-    np.testing.assert_array_equal(one.pattern_[0].get_ydata(), other.pattern_[0].get_ydata())
-    without = SynchronizationDisplay.from_predictions(points, times)
-    np.testing.assert_allclose(
-        without.pattern_[0].get_ydata(), pipe[2].transform(points)[:, :, 0].mean(axis=0)
-    )
-    assert "mean" in without.axes_[1].get_title()
+    np.testing.assert_array_equal(ys(one.offsets_), ys(other.offsets_))
+    mean = pipe[2].transform(points)[:, :, 1].mean(axis=0)
+    np.testing.assert_allclose(other.pattern_[0].get_ydata(), mean)
+    assert "mean" in other.axes_[1].get_title()
 
 
 def test_unnamed_features_are_numbered(bunch):
     some = FunctionTransformer(lambda X: [x[:, :3] for x in X])
     pipe = make_pipeline(some, DenseSynchronizer(20), ActionModel()).fit(bunch.data)
-    assert SynchronizationDisplay.from_estimator(pipe, bunch.data).feature_names[0] == "x0"
-    assert ActionModelDisplay.from_estimator(pipe).feature_names == ["x0", "x1", "x2"]
+    assert SynchronizationDisplay.from_estimator(pipe, bunch.data).ylabels[0] == "x0"
+    assert ActionModelDisplay.from_estimator(pipe).ylabels == ["x0", "x1", "x2"]
 
 
 def test_axes_of_the_user(bunch, pipe):
@@ -138,7 +137,7 @@ def test_axes_of_the_user(bunch, pipe):
     _, axes = plt.subplots(2, 1)
     display.plot(axes, warps=False)
     assert display.axes_ == list(axes)
-    assert display.warps_ is None
+    assert display.offsets_ is None
     with pytest.raises(ValueError, match="or 3 axes, one a panel; got 2"):
         display.plot(axes)
     with pytest.raises(ValueError, match="one of a figure's subplots"):
@@ -167,9 +166,13 @@ def test_units_of_the_synchronization_display(bunch, pipe):
             np.testing.assert_allclose(path.vertices[:, 0], np.linspace(0, end, n))
         clock = np.linspace(0, last, P)
         np.testing.assert_allclose(display.pattern_[0].get_xdata(), clock)
-        for path, tau in zip(display.warps_.get_paths(), times, strict=True):
+        scale = {"frames": 1, "percent": 100 / (P - 1)}.get(unit, ends[:, None] / (P - 1))
+        offsets = (times - np.arange(P)) * scale
+        for path, expected in zip(
+            display.offsets_.get_paths(), offsets - offsets.mean(axis=0), strict=True
+        ):
             np.testing.assert_allclose(path.vertices[:, 0], clock)
-            np.testing.assert_allclose(path.vertices[:, 1], tau * last / (P - 1))
+            np.testing.assert_allclose(path.vertices[:, 1], expected, atol=1e-9)
         labels = " ".join(axis.get_xlabel() for axis in display.axes_)
         assert {"frames": "frame of", "percent": "% of", "seconds": "(s)"}[unit] in labels
     with pytest.raises(ValueError, match="needs frame_rate"):
@@ -213,7 +216,10 @@ def band(clock, lower, upper):
     return np.column_stack([[*xs, xs[0]], [*ys, ys[0]]])
 
 
-def check_bands(display, lower, upper):
+def check_bands(display, match, coverage, *args):
+    """The intervals of a match, from the mean of the offsets."""
+    offsets, lower, upper = match.offsets_in(*(args or ["frames"]), coverage=coverage)
+    lower, upper = lower - offsets.mean(axis=0), upper - offsets.mean(axis=0)
     bands = segments(display.intervals_)
     assert len(bands) == len(lower)
     for found, *bounds in zip(bands, lower, upper, strict=True):
@@ -224,21 +230,19 @@ def test_bands_are_the_intervals_of_the_match(bunch, pipe):
     match = Match.from_estimator(pipe, bunch.data)
     for coverage in (0.9, 0.5, np.float32(0.75)):
         display = SynchronizationDisplay.from_estimator(pipe, bunch.data, coverage=coverage)
-        check_bands(display, *match.interval(coverage))
+        check_bands(display, match, coverage)
         title = display.axes_[-1].get_title()
         assert title.endswith(f"shaded: {100 * coverage:g} % intervals")
-        assert display.intervals_.get_zorder() < display.warps_.get_zorder()
-    check_bands(SynchronizationDisplay.from_estimator(pipe, bunch.data), *match.interval(0.9))
+        assert display.intervals_.get_zorder() < display.offsets_.get_zorder()
+    check_bands(SynchronizationDisplay.from_estimator(pipe, bunch.data), match, 0.9)
 
 
-def test_bands_have_the_unit_of_the_warps(bunch, pipe):
+def test_bands_have_the_unit_of_the_offsets(bunch, pipe):
     match, seconds = Match.from_estimator(pipe, bunch.data), {"unit": "seconds", "frame_rate": 50}
     display = SynchronizationDisplay.from_estimator(pipe, bunch.data, unit="percent")
-    check_bands(display, *match.interval(0.9, "percent"))
-    # Seconds of the median trial, for all of them.
-    lasts = np.median([len(x) - 1 for x in bunch.data])
+    check_bands(display, match, 0.9, "percent")
     display = SynchronizationDisplay.from_estimator(pipe, bunch.data, **seconds)
-    check_bands(display, *match.interval(0.9, "seconds", [lasts + 1] * 9, 50))
+    check_bands(display, match, 0.9, "seconds", bunch.data, 50)
 
 
 def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
@@ -247,25 +251,17 @@ def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
     assert doubtful.tolist() == [i == 4 for i in range(9)]
     for groups in (None, GROUPS):
         display = SynchronizationDisplay.from_estimator(pipe, X, features=[0, 1], groups=groups)
-        for lines in (*display.before_, *display.after_, display.warps_):
+        for lines in (*display.before_, *display.after_, display.offsets_):
             assert is_dotted(lines) == doubtful.tolist()
         assert display.axes_[-1].get_title().endswith("; dotted: 1 doubtful trial")
         assert display.axes_[0].get_title() == "as recorded\n9 trials"
-        colors = display.warps_.get_colors()
+        colors = display.offsets_.get_colors()
         np.testing.assert_array_equal(display.intervals_.get_facecolor()[:, :3], colors[:, :3])
         display.figure_.canvas.draw()
     display = SynchronizationDisplay.from_estimator(pipe, X, warps=False)
     assert display.intervals_ is None
     assert display.axes_[0].get_title() == "as recorded\n9 trials, dotted: 1 doubtful trial"
     assert is_dotted(display.before_[0]) == doubtful.tolist()
-
-
-def test_sure_trials_are_drawn_as_before(bunch, pipe):
-    for coverage in (0.9, None):
-        display = SynchronizationDisplay.from_estimator(pipe, bunch.data, coverage=coverage)
-        for lines in (*display.before_, *display.after_, display.warps_):
-            assert not any(is_dotted(lines))
-        assert "dotted" not in display.axes_[-1].get_title()
 
 
 def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
@@ -277,9 +273,9 @@ def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
         SynchronizationDisplay.from_estimator(linear, X),
         SynchronizationDisplay.from_estimator(by_marks, bunch.data, **marks),
     ):
-        assert display.intervals is display.doubtful is display.intervals_ is None
-        assert display.axes_[-1].get_title() == "warps; dashed: an even pace"
-        assert not any(is_dotted(display.warps_))
+        assert display.doubtful is display.intervals_ is None
+        assert display.axes_[-1].get_title() == "offsets"
+        assert not any(is_dotted(display.offsets_))
     for coverage in (1.0, 90, "most"):
         with pytest.raises(ValueError, match="coverage must be a probability above 0"):
             SynchronizationDisplay.from_estimator(linear, X, coverage=coverage)
@@ -289,7 +285,7 @@ def test_the_warps_of_whole_trials_of_parts_have_bands(bunch, pipe):
     points = pipe[:2].transform(bunch.data)
     sync = PartSynchronizer({"first": [0]}, synchronizer=DenseSynchronizer(30)).fit(points)
     display = SynchronizationDisplay.from_estimator(sync, points)
-    check_bands(display, *sync.match(points).interval(0.9))
+    check_bands(display, sync.match(points), 0.9)
 
 
 def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch, pipe):
@@ -299,8 +295,8 @@ def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch
     other = SynchronizationDisplay.from_estimator(pipe[2], points)
     for found, expected in zip(segments(one.intervals_), segments(other.intervals_), strict=True):
         np.testing.assert_array_equal(found, expected)
-    assert is_dotted(one.warps_) == is_dotted(other.warps_) == match.doubtful.tolist()
-    title = "warps; dashed: an even pace\nshaded: {} % intervals; dotted: 1 doubtful trial"
+    assert is_dotted(one.offsets_) == is_dotted(other.offsets_) == match.doubtful.tolist()
+    title = "offsets\nshaded: {} % intervals; dotted: 1 doubtful trial"
     assert one.axes_[-1].get_title() == other.axes_[-1].get_title() == title.format(90)
     half = SynchronizationDisplay.from_predictions(points, match, coverage=0.5)
     assert half.axes_[-1].get_title() == title.format(50)
@@ -310,7 +306,7 @@ def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch
     ):
         assert plain.axes_[-1].get_title() == title.partition("\n")[0]
         assert plain.intervals_ is None
-        assert not any(is_dotted(plain.warps_))
+        assert not any(is_dotted(plain.offsets_))
 
 
 def test_many_bands_are_lighter_than_few(bunch, pipe):
@@ -337,7 +333,7 @@ def test_gaps_and_keyframes_are_drawn_with_bands(bunch, pipe):
     lows = np.array([[x[:, 0].argmax()] for x in pipe[:2].transform(bunch.data)])
     sync = DenseSynchronizer(30).fit(points, keyframes=lows)
     display = SynchronizationDisplay.from_estimator(sync, points, keyframes=lows, features=0)
-    check_bands(display, *sync.match(points, keyframes=lows).interval(0.9))
+    check_bands(display, sync.match(points, keyframes=lows), 0.9)
     assert len(display.keyframes_) == 2
     assert np.isnan(segments(display.before_[0])[3]).any()
     display.figure_.canvas.draw()
@@ -374,17 +370,17 @@ def test_scaled_signals_are_drawn_as_recorded_with_names_and_units():
     for band in ("points", "performances"):
         model = ActionModelDisplay.from_estimator(pipe, tables, band=band, **given)
         lower, upper = pipe[2].envelope(simultaneous=band == "performances")
-        (drawn,) = model.groups
-        for found, scaled in zip(drawn[:3], (pipe[2].mean_, lower, upper), strict=True):
+        drawn = model.mean, model.lower, model.upper
+        for found, scaled in zip(drawn, (pipe[2].mean_, lower, upper), strict=True):
             expected = pipe[0].inverse_transform(scaled)[:, [3, 0]]
             np.testing.assert_allclose(found, expected, atol=1e-9)
         performances = pipe[0].inverse_transform(list(pipe[:2].transform(tables)))
-        np.testing.assert_allclose(drawn.performances, np.stack(performances)[:, :, [3, 0]])
+        np.testing.assert_allclose(model.performances, np.stack(performances)[:, :, [3, 0]])
         assert [axis.get_ylabel() for axis in model.axes_] == labels
         assert model.axes_[0].get_xlabel() == "% gait cycle"
 
 
-def test_groups_without_a_band_and_features_of_other_steps_are_unscaled(bunch):
+def test_features_of_other_steps_are_unscaled(bunch):
     cosines = DirectionCosines(bunch.skeleton)
     scaled = make_pipeline(cosines, FrameWise(StandardScaler()), DenseSynchronizer(30))
     scaled.fit(bunch.data)
@@ -396,12 +392,11 @@ def test_groups_without_a_band_and_features_of_other_steps_are_unscaled(bunch):
     steps = *scaled[:2], TimingChannel(DenseSynchronizer(30)), ActionModel()
     pipe = make_pipeline(*steps).fit(bunch.data)
     last = pipe[-1].mean_.shape[1] - 1
-    model = ActionModelDisplay.from_estimator(pipe, bunch.data, features=[4, last], groups=GROUPS)
+    model = ActionModelDisplay.from_estimator(pipe, bunch.data, features=[4, last])
     whole = pipe[:-1].transform(bunch.data)
-    np.testing.assert_allclose(model.groups[2].mean[:, 1], whole[8][:, last])
+    np.testing.assert_allclose(model.performances[8][:, 1], whole[8][:, last])
     unscaled = pipe[1].inverse_transform(whole[8][:, :last])
-    np.testing.assert_allclose(model.groups[2].mean[:, 0], unscaled[:, 4])
-    assert np.isnan(model.groups[2].lower).all()
+    np.testing.assert_allclose(model.performances[8][:, 0], unscaled[:, 4])
     # A scaler of the frames of rows is none of their one feature.
     rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
     pipe = make_pipeline(StandardScaler(), DenseSynchronizer(20)).fit(rows)

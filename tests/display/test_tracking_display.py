@@ -4,6 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.base import clone
 from sklearn_motionsync import DirectionCosines, LinearSynchronizer, MotionTracker, Track
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import TrackingDisplay
@@ -67,8 +68,7 @@ def test_lost_intervals_and_chosen_features(tracker):
     assert (display.truths_, display.observed_) == ([], [])
     assert [axis.get_ylabel() for axis in display.axes_] == ["x1", "x36", "phase (frame)", "rate"]
     axes = display.axes_
-    assert display.plot(axes, features=[2, 3]).axes_ == axes
-    assert axes[0].get_ylabel() == "x2"
+    assert display.plot(axes).axes_ == axes
     legend = [text.get_text() for text in axes[0].get_legend().get_texts()]
     assert legend == ["90 %", "estimate", "lost"]
 
@@ -87,20 +87,8 @@ def test_a_single_frame_long_names_and_shared_axes(tracker):
     assert axes[2, 0].get_ylim()[1] > 3 * track.rates.max()
 
 
-def test_truth_has_the_form_of_the_takes(tracker):
-    table = pd.concat(
-        [pd.DataFrame(X[3]), pd.DataFrame(SEEN)], keys=["a", "b"], names=["take", "frame"]
-    )
-    display = TrackingDisplay.from_estimator(tracker, table, truth=table.fillna(0), take=1)
-    np.testing.assert_array_equal(display.truth, np.nan_to_num(SEEN))
-    rows = np.array([np.sin(np.linspace(0, size, 30)) for size in (3, 3.1, 3.2)])
-    univariate = MotionTracker(LinearSynchronizer(), n_particles=20, random_state=0).fit(rows)
-    display = TrackingDisplay.from_estimator(univariate, rows, truth=rows, take=1)
-    np.testing.assert_array_equal(display.truth[:, 0], rows[1])
-
-
-def test_bodies_of_strip_and_side_by_side(display):
-    """Hidden limbs are violet, the truth is a shadow, and unobserved joints are missing."""
+def test_bodies_of_a_strip(display):
+    """Hidden limbs are violet, and the truth is a shadow."""
     strip = display.strip(COSINES, frames=[2, 10])
     skeleton = COSINES.skeleton.body()
     joints = [skeleton.joints.index(f"left_{name}") for name in ("shoulder", "elbow", "wrist")]
@@ -109,47 +97,39 @@ def test_bodies_of_strip_and_side_by_side(display):
     np.testing.assert_allclose(
         strip.behind[1][0].reshape(-1), COSINES.inverse_transform(X[4])[10], atol=1e-12
     )
-    people = display.side_by_side(COSINES)
-    assert people.labels == ["seen", "estimate", "truth"]
-    seen, estimate, _ = people.scenes[0]
-    gaps = np.isnan(seen).any(axis=2)
-    expected = np.zeros_like(gaps)
-    expected[SPAN, joints[1:]] = True
-    np.testing.assert_array_equal(gaps, expected)
     np.testing.assert_allclose(
-        estimate.reshape(len(SEEN), -1), COSINES.inverse_transform(display.track.postures)
+        strip.scenes[1][0].reshape(-1), COSINES.inverse_transform(display.track.postures)[10]
     )
     assert COSINES.hidden == "raise"
 
 
-def test_takes_and_projections(tracker):
-    takes, truth = [X[3], SEEN], [X[3], X[4]]
-    display = TrackingDisplay.from_estimator(tracker, takes, truth=truth, take=1, smooth=True)
-    np.testing.assert_array_equal(display.track.postures, tracker.smooth(takes)[1].postures)
-    np.testing.assert_array_equal(display.truth, X[4])
-    matrix, _ = COSINES.position_matrix()
-    seen = X[4] @ matrix.T
-    times = np.arange(len(seen)) / 15
-    display = TrackingDisplay.from_estimator(tracker, seen, projection=matrix, times=times)
-    assert display.observed is None
+def test_times_units_and_tables(tracker):
+    times = np.arange(len(SEEN)) / 15
+    table = pd.DataFrame(SEEN, columns=NAMES)
+    table.attrs["units"] = ["legs", *["1"] * 36]
+    fitted = clone(tracker).fit([pd.DataFrame(x, columns=NAMES) for x in X[:2]])
+    display = TrackingDisplay.from_estimator(
+        fitted, table, times=times, features="pelvis_height", xlabel="since the start (s)"
+    )
     assert display.phase_.get_xdata()[-1] == times[-1]
+    assert display.axes_[0].get_ylabel() == "pelvis_height\n(legs)"
+    assert display.axes_[-1].get_xlabel() == "since the start (s)"
+    track = tracker.smooth([SEEN])[0]
+    drawn = TrackingDisplay.from_predictions(track, observed=SEEN, features=HIDDEN[0])
+    np.testing.assert_array_equal(drawn.estimates_[0].get_ydata(), track.postures[:, HIDDEN[0]])
 
 
 def test_from_estimator_refuses(tracker, display):
     for change, message in (
-        ({"take": 1}, "take must be from 0 to 0"),
-        ({"take": [0]}, "take must be one number from 0 to 0"),
+        ({"X": [SEEN, SEEN]}, "X must be one take, 2-D, got an array-like with 3 axes"),
         ({"features": "tail_x"}, "no feature 'tail_x'"),
         ({"truth": X[4][1:]}, "The truth must have the shape"),
         ({"names": ["one"]}, "names must be a list of text"),
     ):
         with pytest.raises(ValueError, match=message):
-            TrackingDisplay.from_estimator(tracker, SEEN, **change)
-    with pytest.raises(ValueError, match="There are 2 takes, but truth of 1"):
-        TrackingDisplay.from_estimator(tracker, [SEEN, SEEN], truth=[X[4]])
-    back = np.arange(len(SEEN))[::-1]
-    with pytest.raises(ValueError, match="Performance 1: time stamps must increase"):
-        TrackingDisplay.from_estimator(tracker, [SEEN, SEEN], take=1, times=[back, back])
+            TrackingDisplay.from_estimator(tracker, **({"X": SEEN} | change))
+    with pytest.raises(ValueError, match="time stamps must increase"):
+        TrackingDisplay.from_estimator(tracker, SEEN, times=np.arange(len(SEEN))[::-1])
     with pytest.raises(ValueError, match="cosines must be DirectionCosines, got int"):
         display.strip(1)
     with pytest.raises(ValueError, match="track must be the Track of one take"):

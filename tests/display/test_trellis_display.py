@@ -35,14 +35,14 @@ def test_disparity_space_agrees_with_brute_force(bunch, pipe, max_rate):
         for d in offsets:
             difference = base[p] - moving[p + d]
             expected[p, d + 4] = difference @ difference
-    np.testing.assert_allclose(display.costs, expected, atol=1e-12)
-    np.testing.assert_array_equal(display.offsets, np.arange(-4, 5))
+    np.testing.assert_allclose(display.space.costs, expected, atol=1e-12)
+    np.testing.assert_array_equal(display.space.offsets, np.arange(-4, 5))
     # The image is the space, the best path its cheapest way through, as match tells.
-    np.testing.assert_array_equal(display.image_.get_array().T.filled(np.nan), display.costs)
+    np.testing.assert_array_equal(display.image_.get_array().T.filled(np.nan), display.space.costs)
     path = display.path_.get_ydata()
     at = (path + 4).round().astype(int)
     rates = np.diff(np.arange(16) + path)
-    total = display.costs[np.arange(16), at].sum() + dense.mu_ * np.abs(rates - 1).sum()
+    total = display.space.costs[np.arange(16), at].sum() + dense.mu_ * np.abs(rates - 1).sum()
     match = dense.match([points[5]])
     np.testing.assert_allclose(total, match.distances[0])
     np.testing.assert_array_equal(display.warp_.get_ydata(), match.offsets[0])
@@ -53,9 +53,9 @@ def test_cells_of_the_image_are_centred_on_offsets(bunch, pipe):
     display = TrellisDisplay.from_estimator(pipe, bunch.data, performance=1)
     left, right, bottom, top = display.image_.get_extent()
     assert (left, right) == (-0.5, 29.5)
-    assert (bottom, top) == (display.offsets[0] - 0.5, display.offsets[-1] + 0.5)
-    assert f"template {pipe[2].pattern_index_}" in display.ax_.get_xlabel()
-    assert "trial 1" in display.ax_.get_title()
+    assert (bottom, top) == (display.space.offsets[0] - 0.5, display.space.offsets[-1] + 0.5)
+    assert f"template {pipe[2].pattern_index_}" in display.axes_[0].get_xlabel()
+    assert "trial 1" in display.axes_[0].get_title()
     points = pipe[:2].transform(bunch.data)
     np.testing.assert_array_equal(display.warp_.get_ydata(), pipe[2].match(points).offsets[1])
 
@@ -67,27 +67,28 @@ def test_trellis_of_the_second_synchronizer(bunch):
     pipe = make_pipeline(linear, dense).fit(X)
     display = TrellisDisplay.from_estimator(pipe, X, performance=4)
     expected = TrellisDisplay.from_estimator(dense, linear.transform(X), performance=4)
-    np.testing.assert_array_equal(display.costs, expected.costs)
+    np.testing.assert_array_equal(display.space.costs, expected.space.costs)
     np.testing.assert_array_equal(display.warp_.get_ydata(), expected.warp_.get_ydata())
 
 
 def test_disparity_space_of_long_takes_is_subsampled(bunch, pipe, monkeypatch):
     points = pipe[:2].transform(bunch.data)
     whole = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
-    monkeypatch.setattr("sklearn_motionsync.matching.matcher.BATCH_NUMBERS", whole.costs.size // 7)
+    monkeypatch.setattr(
+        "sklearn_motionsync.matching.matcher.BATCH_NUMBERS", whole.space.costs.size // 7
+    )
     thin = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
-    np.testing.assert_array_equal(thin.frames, np.arange(0, 30, 3))
-    np.testing.assert_array_equal(thin.offsets, np.arange(-12, 13, 3))
-    columns = np.searchsorted(whole.offsets, thin.offsets)
-    np.testing.assert_array_equal(thin.costs, whole.costs[::3, columns])
+    np.testing.assert_array_equal(thin.space.frames, np.arange(0, 30, 3))
+    np.testing.assert_array_equal(thin.space.offsets, np.arange(-12, 13, 3))
+    columns = np.searchsorted(whole.space.offsets, thin.space.offsets)
+    np.testing.assert_array_equal(thin.space.costs, whole.space.costs[::3, columns])
     np.testing.assert_array_equal(thin.path_.get_xydata(), whole.path_.get_xydata())
     assert thin.image_.get_extent() == [-1.5, 28.5, -13.5, 13.5]
 
 
 def test_trellis_on_axes_of_the_user(bunch, pipe):
     _, ax = plt.subplots()
-    display = TrellisDisplay.from_estimator(pipe, bunch.data, ax=ax, colorbar=False)
-    assert display.ax_ is ax
-    assert display.colorbar_ is None
+    display = TrellisDisplay.from_estimator(pipe, bunch.data, ax=ax)
+    assert display.axes_ == [ax]
     with pytest.raises(ValueError, match="no DenseSynchronizer in LinearSynchronizer"):
         TrellisDisplay.from_estimator(LinearSynchronizer(9).fit(bunch.data), bunch.data)

@@ -264,7 +264,7 @@ def test_of_several_cycles_that_fit_the_learnt_one_is_taken():
     np.testing.assert_allclose(np.diff(locations["start"]), 40, atol=4)
     assert len(locations) >= 14
     display = CycleDisplay.from_estimator(segmenter, [beat])
-    assert display.period == pytest.approx(40, rel=0.1)
+    assert display.repeats.period == pytest.approx(40, rel=0.1)
     # A step and two are both as long as what this one has learnt, and neither as this one has.
     with pytest.warns(UserWarning, match="several cycles fit"):
         mixed = CycleSegmenter(start=0).fit([steady, beat])

@@ -57,7 +57,7 @@ def test_subclass_works_in_pipelines_and_displays(bending):
     pipe = make_pipeline(cosines, ASpace(), ShiftSynchronizer(50), ActionModel()).fit(data)
     assert pipe.predict(data).shape == (8,)
     display = SynchronizationDisplay.from_estimator(pipe, data, features=["aspace0"])
-    assert display.pattern_index == pipe[2].pattern_index_
+    assert display.titles[1] == f"the template, trial {pipe[2].pattern_index_}"
     np.testing.assert_array_equal(display.match.times, Match.from_estimator(pipe, data).times)
     assert len(SkeletonDisplay.from_estimator(pipe, data).axes_) == 2
     assert np.isfinite(cross_val_score(pipe[:3], data, cv=2, scoring=SpreadScorer())).all()

@@ -372,7 +372,7 @@ def test_wrong_confidence_is_refused(case):
 def test_displays_of_performances_with_gaps():
     sync = clone(DENSE).fit(GAPPY)
     shown = SynchronizationDisplay.from_estimator(sync, GAPPY, features=[3, 4])
-    assert shown.pattern_index == sync.pattern_index_
+    assert shown.titles[1] == f"the template, trial {sync.pattern_index_}"
     # Drawn as a gap: matplotlib leaves the hidden points out.
     hidden = np.isnan(shown.after[0, :, 0])
     assert hidden.any()

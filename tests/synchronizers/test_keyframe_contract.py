@@ -251,7 +251,7 @@ def test_models_of_anchored_trials_take_them(case):
         pipe = make_pipeline(asking, ActionModel()).fit(X, keyframes=K)
     model = ActionModel().fit(expected)
     display = ActionModelDisplay.from_estimator(pipe, X, keyframes=K, features=0)
-    np.testing.assert_array_equal(display.groups[0].performances, expected[:, :, :1])
+    np.testing.assert_array_equal(display.performances, expected[:, :, :1])
     found, others = find_departures(pipe, X, keyframes=K), find_departures(model, list(expected))
     # A model by itself does not tell what timing explains.
     differing = ["feature", "timing"]

@@ -140,7 +140,7 @@ def test_scorers_displays_and_searches_find_the_synchronizer(bunch):
     one, other = (SynchronizationDisplay.from_estimator(p, X) for p in (pipe, plain))
     np.testing.assert_array_equal(one.after, other.after)
     one, other = (TrellisDisplay.from_estimator(p, X, performance=1) for p in (pipe, plain))
-    np.testing.assert_array_equal(one.costs, other.costs)
+    np.testing.assert_array_equal(one.space.costs, other.space.costs)
     assert len(SkeletonDisplay.from_model(pipe, frames=[5]).axes_) == 2
     assert len(SkeletonDisplay.from_departures(pipe, X, performance=1, frames=2).axes_) == 2
     detector = ActionDetector(pipe).fit(X)
@@ -154,20 +154,18 @@ def test_scorers_displays_and_searches_find_the_synchronizer(bunch):
 def test_model_displays_show_the_channel_beside_postures(bunch):
     pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
     display = ActionModelDisplay.from_estimator(pipe, bunch.data)
-    assert display.feature_names == ["aspace0", "aspace1", "aspace2", "offset"]
+    assert display.ylabels == ["aspace0", "aspace1", "aspace2", "offset"]
     features = ["offset", "pelvis_height"]
     plain = steps(bunch, DenseSynchronizer(30), ActionModel()).fit(bunch.data)
     for band in ("points", "performances"):
         display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features, band=band)
         offsets = Match.from_estimator(pipe, bunch.data).offsets_in("percent")
-        np.testing.assert_allclose(display.groups[0].performances[:, :, 0], offsets)
-        np.testing.assert_allclose(display.groups[0].mean[:, 0], offsets.mean(axis=0))
+        np.testing.assert_allclose(display.performances[:, :, 0], offsets)
+        np.testing.assert_allclose(display.mean[:, 0], offsets.mean(axis=0))
         expected = ActionModelDisplay.from_estimator(
             plain, bunch.data, features="pelvis_height", band=band
         )
-        np.testing.assert_allclose(
-            display.groups[0].performances[:, :, 1:], expected.groups[0].performances
-        )
+        np.testing.assert_allclose(display.performances[:, :, 1:], expected.performances)
     # A limb varies by what the aSpace leaves out, too; the channel does not.
     strange = [*bunch.data[:2], bunch.data[2][::-1]]
     found = find_departures(pipe, strange, features="offset", limit=0.1)
@@ -262,7 +260,7 @@ def test_errors_pass_through_pipelines_and_tables(bunch):
         np.diff(Match.from_estimator(pipe, X).interval(0.6827, "percent"), axis=0)[0] / 2,
     )
     display = ActionModelDisplay.from_estimator(pipe, X, features=["offset_error", "pelvis_height"])
-    assert display.feature_names == ["offset_error", "pelvis_height"]
+    assert display.ylabels == ["offset_error", "pelvis_height"]
     assert np.isfinite(cross_val_score(pipe, X, cv=2)).all()
 
 

@@ -27,7 +27,6 @@ from sklearn_motionsync import (
     write_report,
 )
 from sklearn_motionsync.display import (
-    ActionModelDisplay,
     GroupDisplay,
     LagDisplay,
     SynchronizationDisplay,
@@ -93,14 +92,6 @@ METHODS = {
     "write_report(groups)": (lambda g: report(groups=g), True),
     "write_report(people)": (lambda p: report(people=p), False),
     "find_performances(groups)": (lambda g: find_performances(SYNC, X[0], groups=g), True),
-    "ActionModelDisplay.from_estimator(groups)": (
-        lambda g: ActionModelDisplay.from_estimator(PIPE, X, groups=g),
-        False,
-    ),
-    "ActionModelDisplay.from_estimator(people)": (
-        lambda p: ActionModelDisplay.from_estimator(PIPE, X, groups=list("ab") * 3, people=p),
-        False,
-    ),
     "LagDisplay.from_estimator(groups)": (
         lambda g: LagDisplay.from_estimator(PARTS, X, groups=g),
         False,
