@@ -1,4 +1,4 @@
-"""Arguments that several displays take: names, indices, frames, performances, and live takes."""
+"""Arguments that several displays take: names, units, indices, frames, and performances."""
 
 from collections.abc import Iterable, Mapping, Set
 from itertools import takewhile
@@ -12,6 +12,7 @@ from ..inputs.facts import units_of_columns
 from ..inputs.numbers import is_integer
 from ..inputs.tables import labels_of
 from ..utils.pipelines import flat_steps
+from .base import text_of_label
 
 __all__ = [
     "TIME_LABELS",
@@ -100,8 +101,7 @@ def as_performances(X) -> list:
 
 def labels_as_text(performances):
     """Labels of performances, the levels of a label joined by commas."""
-    labels = labels_of(performances)[0]
-    return [", ".join(map(str, n)) if isinstance(n, tuple) else str(n) for n in labels]
+    return list(map(text_of_label, labels_of(performances)[0]))
 
 
 def labels_of_signals(names, known_units, ylabel=None, units=None):

@@ -43,6 +43,7 @@ __all__ = [
     "pyplot",
     "signal_layout",
     "text_of_keyframe",
+    "text_of_label",
 ]
 
 # Okabe and Ito's colours and a violet, which colour-blind people can distinguish. Each has one
@@ -527,12 +528,15 @@ def keyframes_of_trials(synchronizer, performances, params):
     return rows.shares(performances, len(on_clock)) * last
 
 
+def text_of_label(label):
+    """The text of a label; the levels of one with several, such as a context, after commas."""
+    return ", ".join(map(str, label)) if isinstance(label, tuple) else str(label)
+
+
 def text_of_keyframe(name):
-    """The text of a name, or of a pair such as label and context; empty for a number."""
-    if isinstance(name, (int, np.integer)):
-        return ""
-    text = ", ".join(map(str, name)) if isinstance(name, tuple) else str(name)
-    return text.replace("$", r"\$")
+    """The text of the name of a key-frame; empty for a number."""
+    is_number = isinstance(name, (int, np.integer))
+    return "" if is_number else text_of_label(name).replace("$", r"\$")
 
 
 def draw_keyframes(axis, times, names=()):

@@ -202,7 +202,7 @@ def split_at_synchronizer(estimator):
     if before is None:
         raise ValueError(
             "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
-            "by itself use from_predictions with the joint positions."
+            "by itself use from_performances with the joint positions."
         )
     transformers = [each for step in flat_steps(before) for each in union_transformers(step)]
     views = [each for each in transformers if isinstance(each, PositionsTransformer)]

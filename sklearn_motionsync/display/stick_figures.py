@@ -32,7 +32,7 @@ from .arguments import (
     as_performances,
     labels_as_text,
 )
-from .base import COLORS, WIDTH, AxesLike, empty_lists
+from .base import WIDTH, AxesLike
 from .bodies import (
     BodyPanel,
     bounds,
@@ -103,8 +103,6 @@ class SkeletonDisplay(MovingDisplay):
         The heads, one line a panel; without a skeleton, or without bones, all joints.
     behind_ : list of LineCollection
         The shadows, one collection a panel; empty without them.
-    moments_ : list of Line2D
-        The share of the time that is over, a line at the top of each panel in which bodies move.
     heading_ : Text or None
         The heading.
 
@@ -483,7 +481,7 @@ class SkeletonDisplay(MovingDisplay):
         return [divmod(i, n_cols) for i in range(count)], (n_rows, n_cols), size
 
     def _draw(self):
-        self._bodies, self.moments_ = empty_lists(2)
+        self._bodies = []
         marked = self.marked or [None] * len(self.scenes)
         for axis, title, scene, bones in zip(
             self.axes_, self.titles, self._drawn, marked, strict=True
@@ -493,8 +491,6 @@ class SkeletonDisplay(MovingDisplay):
             if self._at > 0:
                 title = f"{title}, at {100 * self._at:.0f} % of the time"
             stage(axis, title, *self._corners)
-            if max(map(len, scene), default=0) > 1:
-                self.moments_.append(_time_line(axis))
             if self.labels is not None:
                 axis.set_xticks(self._gap * np.arange(len(self.labels)), self.labels)
         self.bones_ = [panel.bones for panel in self._bodies]
@@ -508,8 +504,6 @@ class SkeletonDisplay(MovingDisplay):
         if durations is None:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene, default=0) for of_scene in durations)
-        for line in self.moments_:
-            line.set_xdata([0, at])
         for panel, scene, of_scene, behind in zip(
             self._bodies, self._drawn, durations, self._behind, strict=True
         ):
@@ -518,21 +512,6 @@ class SkeletonDisplay(MovingDisplay):
                 x[whole(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
             ]
             panel.show(bodies, [x[whole(at * (len(x) - 1))] for x in behind])
-
-
-def _time_line(axis):
-    """A line at the top that tells the time: a text would take longer to draw than all bodies."""
-    for end, name in ((1, "shadow"), (0, "middle")):
-        (line,) = axis.plot(
-            [0, end],
-            [0.99, 0.99],
-            color=COLORS[name],
-            linewidth=2,
-            transform=axis.transAxes,
-            solid_capstyle="butt",
-            zorder=0,
-        )
-    return line
 
 
 def postures_at(frames, performances):

@@ -12,7 +12,7 @@ from sklearn.utils import Bunch
 from ..inputs.types import PerformancesLike
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
-from .base import COLORS, WIDTH, AxesLike, Display, keyframes_of_trials, legend_above
+from .base import COLORS, WIDTH, AxesLike, Display, front_line, legend_above
 
 __all__ = ["TrellisDisplay"]
 
@@ -31,9 +31,6 @@ class TrellisDisplay(Display):
         The final offsets Delta(p), after consensus, smoothing and refinement.
     names : (str, str)
         Names of the pattern and of the performance.
-    keyframes : ndarray, shape (n_keyframes, 2), default=None
-        The frame of each key-frame in the pattern, and the offset of the performance there; NaN
-        where one is not known.
 
     Attributes
     ----------
@@ -43,8 +40,6 @@ class TrellisDisplay(Display):
         The costs.
     path_, warp_ : Line2D
         The best path, and the final warp.
-    keyframes_ : Line2D or None
-        The key-frames, as points.
     colorbar_ : Colorbar
         The scale of the costs.
 
@@ -63,7 +58,6 @@ class TrellisDisplay(Display):
     space: Bunch
     warp: np.ndarray
     names: tuple[str, str]
-    keyframes: np.ndarray | None = None
 
     def __repr__(self):
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
@@ -91,8 +85,7 @@ class TrellisDisplay(Display):
         ax : Axes, default=None
             See `plot`.
         **params : dict
-            Further arguments of the synchronizer and of steps before, such as ``keyframes``, which
-            are drawn as points.
+            Further arguments of the synchronizer and of steps before, such as ``keyframes``.
 
         Returns
         -------
@@ -109,12 +102,7 @@ class TrellisDisplay(Display):
             warp = synchronizer.match(performances.take([performance])).offsets[0]
         index = index_of_pattern(synchronizer, performances)
         names = ("template" if index is None else f"template {index}", f"trial {performance}")
-        keyframes = keyframes_of_trials(synchronizer, performances, reached.params)
-        if keyframes is not None:
-            last = (synchronizer.n_frames_ - 1) / (len(performances[performance]) - 1)
-            at = synchronizer.keyframes_
-            keyframes = np.column_stack([at, keyframes[performance] * last - at])
-        return cls(space, warp, names, keyframes).plot(ax)
+        return cls(space, warp, names).plot(ax)
 
     def _layout(self):
         return [(0, 0)], (1, 1), (WIDTH, 4)
@@ -122,7 +110,6 @@ class TrellisDisplay(Display):
     def _draw(self):
         from matplotlib.colors import PowerNorm
         from matplotlib.patches import Patch
-        from matplotlib.patheffects import Normal, Stroke
 
         (axis,), space = self.axes_, self.space
         frames = np.arange(len(space.path))
@@ -137,41 +124,18 @@ class TrellisDisplay(Display):
             norm=PowerNorm(0.5, vmin=0),
         )
         axis.set_facecolor("0.85")
-        rims = ([Stroke(linewidth=width, foreground="white"), Normal()] for width in (4, 3))
-        (self.path_,) = axis.plot(
-            frames,
-            space.path,
-            label="best path",
-            color=COLORS["mean"],
-            linewidth=2,
-            path_effects=next(rims),
+        orange, black = COLORS["mean"], COLORS["pattern"]
+        self.path_ = front_line(
+            axis, frames, space.path, color=orange, linewidth=2, label="best path"
         )
-        (self.warp_,) = axis.plot(
-            frames,
-            self.warp,
-            "--",
-            label="warp in the end",
-            color=COLORS["pattern"],
-            linewidth=1.6,
-            path_effects=next(rims),
+        self.warp_ = front_line(
+            axis, frames, self.warp, color=black, linestyle="--", label="warp in the end"
         )
         axis.set_title(f"{self.names[1]} matched to {self.names[0]}", fontsize="medium")
         offset = f"offset d of {self.names[1]} (frames)"
         self._label_axes([axis], [offset], f"frame p of {self.names[0]}")
         outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
-        handles, self.keyframes_ = [self.path_, self.warp_, outside], None
-        if self.keyframes is not None and np.isfinite(self.keyframes).all(axis=1).any():
-            (self.keyframes_,) = axis.plot(
-                *self.keyframes.T,
-                "o",
-                label="key-frame",
-                color="white",
-                markersize=7,
-                markeredgecolor="black",
-                zorder=5,
-            )
-            handles.append(self.keyframes_)
-        legend_above([axis], handles)
+        legend_above([axis], [self.path_, self.warp_, outside])
         axis.grid(False)
         self.colorbar_ = self.figure_.colorbar(self.image_, ax=axis)
         self.colorbar_.set_label("difference E(p, d); dark: alike")

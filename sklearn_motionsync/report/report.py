@@ -29,6 +29,7 @@ from ..display.base import (
     named_keyframes,
     panels,
     pyplot,
+    text_of_label,
 )
 from ..display.groups import display_of_groups
 from ..display.synchronization import SynchronizationDisplay
@@ -197,7 +198,7 @@ def _add_set(page, trials, estimator, left_out):
     if trials.template is not None:
         template = f"The template is trial {trials.names[trials.template]}."
     omitted = pd.DataFrame(
-        [(as_text(label), str(reason)) for label, reason in (left_out or {}).items()],
+        [(text_of_label(label), str(reason)) for label, reason in (left_out or {}).items()],
         columns=["trial", "reason"],
     )
     with config_context(print_changed_only=True):
@@ -330,11 +331,6 @@ def _add_doubtful(page, trials):
 # -- the tables ---------------------------------------------------------------------------
 
 
-def as_text(label):
-    """A label of a trial; the levels of one with several are joined by commas."""
-    return ", ".join(map(str, label)) if isinstance(label, tuple) else str(label)
-
-
 class TrialSet(NamedTuple):
     """What is known of the trials of a report.
 
@@ -381,7 +377,7 @@ class TrialSet(NamedTuple):
         units = dict(zip(aligned.names, aligned.units, strict=True))
         return cls(
             aligned,
-            list(map(as_text, labels_of_input(X, reached.performances)[0])),
+            list(map(text_of_label, labels_of_input(X, reached.performances)[0])),
             index_of_pattern(reached.synchronizer, reached.performances),
             pd.DataFrame(design, index=range(n)),
             of_groups,

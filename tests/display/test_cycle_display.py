@@ -1,6 +1,5 @@
 """CycleDisplay: its artists agree with the estimator."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -37,7 +36,11 @@ def test_artists_agree_with_the_estimator(segmenter):
     assert display.axes_[1].get_ylabel() == "x0"
     cycles = len(cuts) - 1
     assert repr(display).endswith(f"period {found.period:.1f} frames, {cycles} whole cycles)")
-    other = CycleDisplay.from_estimator(segmenter, GAIT.data, feature="x2", unit="percent")
+    other = CycleDisplay.from_estimator(
+        segmenter, GAIT.data, feature="x2", unit="percent", ylabel="ankle", units="deg", xlabel="%"
+    )
+    assert other.axes_[1].get_ylabel() == "ankle (deg)"
+    assert other.axes_[1].get_xlabel() == "%"
     np.testing.assert_array_equal(other.curve_.get_ydata(), GAIT.data[0][:, 2])
     assert other.curve_.get_xdata()[-1] == 100
 
@@ -48,13 +51,6 @@ def test_a_take_without_cycles_is_drawn_without_cuts():
     assert (display.period_, len(display.cuts_.get_segments())) == (None, 0)
     assert display.axes_[0].get_title() == "not cyclic"
     assert display.axes_[1].get_ylabel() == "left ankle ahead (legs)"
-
-
-def test_axes_of_the_user(segmenter):
-    _, axes = plt.subplots(2)
-    display = CycleDisplay.from_estimator(segmenter, GAIT.data, ax=axes)
-    assert display.axes_ == list(axes)
-    assert display.plot(plt.figure().add_subplot()).axes_ != list(axes)
 
 
 def test_from_estimator_refuses(segmenter):

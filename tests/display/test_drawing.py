@@ -88,13 +88,6 @@ def test_parts_outside_a_band_have_the_right_length():
     assert len(parts_outside(ys[2:3], center, center)[0]) == 0
 
 
-def test_parts_outside_of_a_curve_that_crosses_the_band():
-    xs, ys = parts_outside(np.array([[3.0, -3.0]]), np.full(2, -1.0), np.full(2, 1.0))
-    order = np.argsort(xs[:, 0])
-    np.testing.assert_allclose(xs[order], [[0, 1 / 3], [2 / 3, 1]])
-    np.testing.assert_allclose(ys[order], [[3, 1], [-1, -3]])
-
-
 def test_matplotlib_is_imported_on_drawing_only():
     code = "import sys, sklearn_motionsync; assert 'matplotlib' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -48,6 +48,9 @@ def test_refused(walk):
 
 def test_events_of_the_user_are_drawn(walk):
     events = gait_events(walk.data, walk.skeleton, frame_rate=100).iloc[:3]
-    shown = GaitDisplay.from_positions(walk.data, walk.skeleton, events=events, frame_rate=100)
+    shown = GaitDisplay.from_positions(
+        walk.data, walk.skeleton, events=events, frame_rate=100, xlabel="since the start (s)"
+    )
+    assert shown.axes_[-1].get_xlabel() == "since the start (s)"
     assert repr(shown) == "GaitDisplay(2 strikes, 1 foot-off)"
     plt.close(shown.figure_)

@@ -1,6 +1,5 @@
 """MetricDisplay: its bars agree with the metric of the estimator."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,17 +90,6 @@ def test_rows_have_the_names_of_features_and_columns():
     tables = [pd.DataFrame(x[:, 1:4], columns=["hip", "knee", "toe"]) for x in BUNCH.data]
     display = MetricDisplay.from_estimator(DenseSynchronizer(30).fit(tables), features=["toe"])
     assert labels(display) == ["toe"]
-
-
-def test_axes_of_the_user_and_new_plot(noisy):
-    figure, axes = plt.subplots(1, 2)
-    display = MetricDisplay.from_estimator(noisy, features=[0, 37], ax=axes[1])
-    assert display.axes_ == [axes[1]]
-    assert display.figure_ is figure
-    assert display.plot() is display
-    assert display.figure_ is not figure
-    with pytest.raises(ValueError, match="ax must be Axes of matplotlib, got 'left'"):
-        display.plot("left")
 
 
 STILL = [np.ones((40, 2))] * 4

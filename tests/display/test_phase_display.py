@@ -115,12 +115,14 @@ def test_unknown_values_are_not_drawn(live):
     x = X[6].copy()
     x[10:20, :5] = np.nan
     times = np.arange(len(x)) / 25 + 3
-    display = PhaseDisplay.from_estimator(live, x, times=times, features=0, names=["half seen"])
+    given = {"times": times, "features": 0, "names": ["half seen"], "xlabel": "since the start"}
+    display = PhaseDisplay.from_estimator(live, x, ylabel="pelvis", units="legs", **given)
+    assert display.axes_[2].get_ylabel() == "pelvis (legs)"
     (row,) = display.rows_
     assert row.afterwards is None
     assert np.isnan(row.curves[0].seen.get_ydata()[10:20]).all()
     assert row.phase.get_xdata()[-1] == pytest.approx((len(x) - 1) / 25)
-    assert display.axes_[1].get_xlabel() == "time (s)"
+    assert display.axes_[1].get_xlabel() == "since the start"
     live.reset()
     for frames in zip(X[6], X[7], strict=False):
         live.step(frames)

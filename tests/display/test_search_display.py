@@ -30,7 +30,8 @@ def test_each_take_has_a_panel():
     table = pd.concat([pd.DataFrame(TAKE), pd.DataFrame(TAKE[:80])], keys=["ann", "bob"])
     takes = to_sequences(table.rename_axis(["take", "frame"]))
     _, origin = find_performances(pd.DataFrame(WAVE), takes)
-    display = SearchDisplay.from_predictions(origin, takes)
+    display = SearchDisplay.from_predictions(origin, takes, xlabel="at 50 Hz")
+    assert display.axes_[-1].get_xlabel() == "at 50 Hz"
     assert [axis.get_title() for axis in display.axes_] == ["take ann", "take bob"]
     assert [axis.get_xlim()[1] for axis in display.axes_] == [len(TAKE), 80]
 

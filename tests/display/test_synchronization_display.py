@@ -16,7 +16,6 @@ from sklearn_motionsync import (
     FrameWise,
     LinearSynchronizer,
     Match,
-    PartSynchronizer,
     TimingChannel,
     to_frame,
 )
@@ -279,13 +278,6 @@ def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
     for coverage in (1.0, 90, "most"):
         with pytest.raises(ValueError, match="coverage must be a probability above 0"):
             SynchronizationDisplay.from_estimator(linear, X, coverage=coverage)
-
-
-def test_the_warps_of_whole_trials_of_parts_have_bands(bunch, pipe):
-    points = pipe[:2].transform(bunch.data)
-    sync = PartSynchronizer({"first": [0]}, synchronizer=DenseSynchronizer(30)).fit(points)
-    display = SynchronizationDisplay.from_estimator(sync, points)
-    check_bands(display, sync.match(points), 0.9)
 
 
 def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch, pipe):

@@ -1,6 +1,5 @@
 """TrellisDisplay: the disparity space agrees with brute force, the image with both."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
@@ -86,9 +85,6 @@ def test_disparity_space_of_long_takes_is_subsampled(bunch, pipe, monkeypatch):
     assert thin.image_.get_extent() == [-1.5, 28.5, -13.5, 13.5]
 
 
-def test_trellis_on_axes_of_the_user(bunch, pipe):
-    _, ax = plt.subplots()
-    display = TrellisDisplay.from_estimator(pipe, bunch.data, ax=ax)
-    assert display.axes_ == [ax]
+def test_other_synchronizers_are_refused(bunch):
     with pytest.raises(ValueError, match="no DenseSynchronizer in LinearSynchronizer"):
         TrellisDisplay.from_estimator(LinearSynchronizer(9).fit(bunch.data), bunch.data)
