@@ -13,7 +13,7 @@ from ..inputs.wording import counted
 # No number of a recording is larger, in any unit.
 _LARGEST = 1e12
 # Bytes of a table that are parsed at once: memory beside the file and its numbers stays constant.
-_PORTION = 2**22
+PORTION = 2**22
 # The characters of plain decimal numbers and of the blanks between them.
 _PLAIN = b"0123456789+-.eE \t\n"
 # Before pandas 3.1 the last digit is right only with this option; since then it is deprecated.
@@ -118,7 +118,7 @@ class MotionText:
         rows = []
         while self.n_left:
             start = self._lines.tell()
-            portion = self._lines.read(_PORTION) + self._lines.readline()
+            portion = self._lines.read(PORTION) + self._lines.readline()
             numbers = _plain_numbers(portion, n)
             if numbers is not None:
                 rows.append(numbers)

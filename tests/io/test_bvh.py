@@ -55,7 +55,7 @@ def test_joints_may_be_called_as_key_words(tmp_path, name):
     np.testing.assert_array_equal(df, read_motion(put(tmp_path, body())))
 
 
-@pytest.mark.parametrize(("deep", "n"), [(True, 6000), (False, 40000)])
+@pytest.mark.parametrize(("deep", "n"), [(True, 2000), (False, 9000)])
 def test_many_joints_deep_and_wide(tmp_path, deep, n):
     head = "HIERARCHY\nROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition\n"
     one = "JOINT a { OFFSET 0 1 0 "
@@ -66,7 +66,7 @@ def test_many_joints_deep_and_wide(tmp_path, deep, n):
 
 
 def test_chain_bends_to_half_a_circle_in_more_frames_than_one_block(tmp_path):
-    n, n_frames = 600, 2000
+    n, n_frames = 600, 1760
     joint = "JOINT a { OFFSET 0 1 0 CHANNELS 1 Zrotation "
     text = (
         f"HIERARCHY\nROOT a {{ OFFSET 0 0 0 {joint * n + '} ' * n}}}\nMOTION\nFrames: {n_frames}\n"

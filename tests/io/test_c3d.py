@@ -61,10 +61,10 @@ def test_missing_parameters_have_defaults(tmp_path):
 
 def test_number_of_frames_is_the_one_that_fits_the_size(tmp_path):
     n = 70000
-    positions = np.zeros((n, 1, 3))
-    changes = {"LONG_FRAMES": (4, [], struct.pack("<f", n))}
-    path = put(tmp_path, c3d(positions, changes=changes), "a.c3d")
-    assert len(read_motion(path)) == n
+    stated = {"LONG_FRAMES": (4, [], struct.pack("<f", n)), "FRAMES": words(65535)}
+    content = c3d(np.zeros((1, 1, 3)), changes=stated, header={"last": 65535})
+    content += bytes(16 * n - 512 + -16 * n % 512)
+    assert len(read_motion(put(tmp_path, content, "a.c3d"))) == n
 
 
 @pytest.mark.parametrize("first", [1, 65530])

@@ -148,7 +148,7 @@ def test_tables_are_read_and_the_line_of_an_error_is_named(tmp_path, seed, blank
 @pytest.mark.parametrize("end", ["", "\n"])
 def test_tables_of_several_portions_are_one(tmp_path, monkeypatch, end):
     """Of 4 kB each, and 5 numbers of 9 bytes a line."""
-    monkeypatch.setattr(text_module, "_PORTION", 2**12)
+    monkeypatch.setattr(text_module, "PORTION", 2**12)
     values = np.random.default_rng(0).integers(10**7, 10**8, (200, 5)).astype(float)
     lines = [" ".join(f"{x:.0f}" for x in row) for row in values.tolist()]
     text = opened(tmp_path, "\n".join(lines) + end)

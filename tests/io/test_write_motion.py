@@ -50,7 +50,7 @@ def test_bvh_is_read_back(tmp_path, benchmark, order):
 def test_file_of_people_is_read_back(tmp_path, real_data, benchmark):
     """142 joints; positions within 1e-4 of a leg, also by a reader that shares no code."""
     (path,) = (real_data / "original_files" / "bvh").glob("*.bvh")
-    df = read_motion(path)
+    df = read_motion(path).iloc[:60]
     again = written(tmp_path, df)
     assert again.columns.tolist() == df.columns.tolist()
     leg = 90

@@ -19,6 +19,7 @@ from sklearn_motionsync import (
     Skeleton,
     TimingChannel,
 )
+from sklearn_motionsync.datasets import make_bending
 
 from estimators import EVERY, WHOLE, by_name, data_for, make_performances, outputs
 
@@ -111,6 +112,14 @@ def test_a_callback_that_raises_stops_the_fit(estimator, where):
     assert recorder.torn_down == 1
     assert vars(fitted).keys() == attributes
     assert bits(fitted, X) == expected
+
+
+@pytest.mark.parametrize(("n_trials", "n_tasks"), [(7, 7), (100, 100), (101, 100), (1000, 100)])
+def test_portions_are_at_most_a_hundred_tasks_of_a_stage(n_trials, n_tasks):
+    bend = make_bending(1, n_frames=10, random_state=0)
+    recorder = Recorder()
+    DirectionCosines(bend.skeleton).set_callbacks(recorder).fit(bend.data * n_trials)
+    assert recorder.events.count(("end", "DirectionCosines", "portion")) == n_tasks
 
 
 # -- estimators that fit others --------------------------------------------------------------

@@ -16,8 +16,7 @@ import pytest
 import sklearn
 import sklearn_motionsync
 import threadpoolctl
-from sklearn_motionsync import DenseSynchronizer, DirectionCosines
-from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.utils.parallel import Progress, run
 
@@ -161,49 +160,6 @@ def test_verbose_prints_at_most_a_line_a_second(capsys, monkeypatch):
             step()
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("%")[0].split(":")[1].strip() for line in lines] == ["40", "80", "100"]
-
-
-class Recorder:
-    """A callback that notes the names of the tasks, as they end."""
-
-    def __init__(self):
-        self.open, self.seen = [], []
-
-    def setup(self, estimator, context):
-        self.seen.append("setup")
-
-    def on_fit_task_begin(self, estimator, context):
-        self.open.append(context.task_name)
-
-    def on_fit_task_end(self, estimator, context):
-        assert self.open.pop() == context.task_name
-        self.seen.append(context.task_name)
-
-    def teardown(self, estimator, context):
-        self.seen.append("teardown")
-
-
-def test_sklearn_callbacks_are_called_for_every_portion(walks):
-    pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
-    recorder = Recorder()
-    sync = DenseSynchronizer().set_callbacks(recorder).fit(walks)
-    assert recorder.seen[0] == "setup"
-    assert recorder.seen[-2:] == ["fit", "teardown"]
-    assert "comparing 300 with 100 performances" in recorder.seen
-    assert recorder.seen.count("portion") >= 3
-    assert recorder.open == []
-    seen = len(recorder.seen)
-    sync.transform(walks[:2])
-    assert len(recorder.seen) == seen
-
-
-@pytest.mark.parametrize(("n_trials", "n_tasks"), [(7, 7), (100, 100), (101, 100), (1000, 100)])
-def test_callbacks_see_at_most_a_hundred_tasks_of_a_stage(n_trials, n_tasks):
-    pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
-    bend = make_bending(1, n_frames=10, random_state=0)
-    recorder = Recorder()
-    DirectionCosines(bend.skeleton).set_callbacks(recorder).fit(bend.data * n_trials)
-    assert recorder.seen.count("portion") == n_tasks
 
 
 # -- interruption -----------------------------------------------------------------------------

@@ -135,7 +135,8 @@ def test_departures_have_feature_names_of_both_views(reduced):
         assert any(name.startswith(view) for name in set(table["feature"]) & names)
 
 
-def test_figures_without_a_body_are_refused(union):
+def test_figures_without_a_body_are_refused():
+    union = UNIONS["of unions"]
     steps = LinearSynchronizer(20), ActionModel()
     with pytest.raises(ValueError, match="need steps with inverse_transform before"):
         SkeletonDisplay.from_model(make_pipeline(union, *steps).fit(BUNCH.data))
