@@ -137,10 +137,7 @@ def fill_gaps(
     >>> fill_gaps(late, 2, ends="trim")["knee_y"].tolist()
     [1.0, 2.0, 3.0]
     """
-    if not isinstance(max_gap, Integral) or isinstance(max_gap, bool) or max_gap < 0:
-        raise ValueError(f"max_gap must be a whole number of frames, 0 or more, got {max_gap!r}.")
-    if ends not in ("keep", "trim"):
-        raise ValueError(f"ends must be 'keep' or 'trim', got {ends!r}.")
+    check_filling(max_gap, ends)
     _, n_dims, values = _read(df)
     missing = _missing(values, n_dims)
     seen = np.where(np.repeat(missing, n_dims, axis=1), np.nan, values)
@@ -148,6 +145,13 @@ def fill_gaps(
     result = pd.DataFrame(values, index=df.index, columns=df.columns)
     result.attrs = dict(df.attrs)
     return _trim(result, _missing(values, n_dims)) if ends == "trim" else result
+
+
+def check_filling(max_gap, ends):
+    if not isinstance(max_gap, Integral) or isinstance(max_gap, bool) or max_gap < 0:
+        raise ValueError(f"max_gap must be a whole number of frames, 0 or more, got {max_gap!r}.")
+    if ends not in ("keep", "trim"):
+        raise ValueError(f"ends must be 'keep' or 'trim', got {ends!r}.")
 
 
 def _trim(df, missing):

@@ -21,7 +21,7 @@ from ..inputs.wording import counted
 from .acclaim import read_acclaim
 from .bvh import read_bvh
 from .c3d import MissingGroup, read_c3d
-from .gaps import fill_gaps, warn_of_gaps
+from .gaps import check_filling, fill_gaps, warn_of_gaps
 from .text import read_storage
 from .trc import read_trc
 
@@ -145,6 +145,7 @@ def read_motion(
     >>> list(df.columns[:3]), df.attrs["frame_rate"], df.attrs["units"]
     (['pelvis_x', 'pelvis_y', 'pelvis_z'], 100.0, 'm')
     """
+    check_filling(max_gap, ends)
     check_frame_rate(frame_rate)
     if columns not in (None, "common") or (columns and isinstance(path, (str, os.PathLike))):
         raise ValueError(
@@ -168,7 +169,7 @@ def read_motion(
     elif frame_rate is not None:
         motion["frame_rate"] = float(frame_rate)
     df = _to_frame(motion, path)
-    if max_gap != 0 or ends != "keep":
+    if max_gap or ends != "keep":
         df = fill_gaps(df, max_gap, ends=ends)
     warn_of_gaps(df, path.name)
     return df
