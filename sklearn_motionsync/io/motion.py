@@ -85,8 +85,7 @@ def read_motion(
         channels. Of several files those that have no such group are left out.
     columns : {None, "common"}, default=None
         Of several files: "common" leaves out the columns that some of them lack, such as other
-        markers, and brings the others into the order of the first. By default all stay. The joints
-        and parents in ``attrs`` are those of the file in any case.
+        markers, and brings the others into the order of the first. By default all stay.
 
     Returns
     -------
