@@ -40,11 +40,10 @@ from .segmentation.self_correlation import self_correlation
 from .synchronizers.base import Synchronizer
 from .synchronizers.blending import blend_performances
 from .synchronizers.dense import DenseSynchronizer
-from .synchronizers.lags import Lags
 from .synchronizers.learning import SynchronizationWarning
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
-from .synchronizers.parts import PartSynchronizer
+from .synchronizers.parts import Lags, PartSynchronizer
 from .synchronizers.timing import TimingChannel
 from .transformers.aspace import ASpace
 from .transformers.framewise import FrameWise

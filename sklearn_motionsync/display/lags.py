@@ -10,9 +10,8 @@ from sklearn.base import BaseEstimator
 
 from ..inputs.types import Labels, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
-from ..synchronizers.lags import Lags
 from ..synchronizers.match import rates_of
-from ..synchronizers.parts import PartSynchronizer
+from ..synchronizers.parts import Lags, PartSynchronizer
 from ..utils.pipelines import route_to_synchronizer
 from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, curves, front_line, legend_above
 

@@ -6,7 +6,7 @@ warps are finished.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -18,20 +18,20 @@ from .costs import COSTS
 from .counting import ROUNDING
 from .filters import SMOOTHING, smooth
 from .gaps import UNSEEN
-from .metric import Evidence, Metric, energy_shares, metric_of_matches
+from .metric import Metric, energy_shares, metric_of_matches
 from .refinement import Refiner
 from .sharpening import Sharpener
 from .sizes import BATCH_NUMBERS, FRAMES
 from .tile import Bases
-from .trellis import Trellis
+from .trellis import Coupling, Trellis
 from .uncertainty import refined_uncertainty, uncertainty_of_paths
 from .units import Unit
 from .warps import evaluate_warps, normalise
 
 __all__ = [
     "Features",
-    "LearntMetric",
     "Matcher",
+    "PartWarper",
     "PathSettings",
     "Warper",
     "cost_features",
@@ -293,24 +293,6 @@ def _trellis(cost, n_frames, mu, settings, unseen, anchors):
 # -- the metric of a training set, which is learnt from matches in a first one --------------------
 
 
-class LearntMetric(NamedTuple):
-    """The metric of a training set.
-
-    Attributes
-    ----------
-    features : Features
-        With the metric.
-    share, energy : ndarray, shape (n_features,)
-        The share of every feature in what is compared, and in the energy of velocities.
-    evidence : Evidence
-    """
-
-    features: Features
-    share: np.ndarray
-    energy: np.ndarray
-    evidence: Evidence
-
-
 def learn_features(features, positions, settings, n_exemplars, warp_smoothing):
     """Features with the metric of a training set.
 
@@ -329,8 +311,9 @@ def learn_features(features, positions, settings, n_exemplars, warp_smoothing):
 
     Returns
     -------
-    LearntMetric or None
-        None if there is nothing to learn.
+    tuple (Features, share, energy, Evidence), or None
+        Features with the metric, and shares (n_features,) of every feature in what is compared and
+        in the energy of velocities. None if there is nothing to learn.
     """
     # Rounding changes a metric much less than noise.
     positions = positions.astype(np.float32, copy=False)
@@ -358,8 +341,8 @@ def learn_features(features, positions, settings, n_exemplars, warp_smoothing):
     if learnt is None:
         return None
     metric, evidence = learnt
-    shares = metric.shares(velocity, poses)
-    return LearntMetric(features.replace(metric=metric), shares, energy_shares(velocity), evidence)
+    shares = metric.shares(velocity, poses), energy_shares(velocity)
+    return features.replace(metric=metric), *shares, evidence
 
 
 # -- warps to the pattern ----------------------------------------------------------------------
@@ -416,10 +399,6 @@ class Warper:
         arrays = [x.astype(np.float64, copy=False) for x in arrays]
         return self.matcher.features.positions(arrays, len(self.pattern))
 
-    def poses(self, positions):
-        """Positions without columns of weights and key-frames."""
-        return self.matcher.features.plain(positions)
-
     def warps(self, positions):
         """Warps of trials: match, vote, smooth and finish.
 
@@ -435,25 +414,34 @@ class Warper:
         times : ndarray, shape (n_trials, P)
             ``tau``.
         """
-        trellis, bases = self.matcher.trellis, self.bases
-        moving, base = self.matcher.features(positions), bases.sequences[0]
-        disparities = trellis.paths(bases, moving)
-        distances = trellis.costs(base, moving, disparities[0])
-        routes = times_of(disparities)
-        if self.smoothing is None:
-            times = routes[0]
-        else:
-            voted = vote(routes[0], self.to_exemplars[:, np.newaxis], routes[1:])
-            times = smooth_warps(voted, trellis.reach, self.smoothing)
-            # A path without any distance is right: the pattern keeps its own pace.
-            seen = distances
-            if trellis.unseen is not None:
-                seen = trellis.costs(base, moving, disparities[0], unseen=0.0)
-            rounding = 64 * np.finfo(positions.dtype).eps * bases.energy[0]
-            times = np.where((seen <= rounding)[:, np.newaxis], routes[0], times)
+        distances, times = self._matched(self.matcher.features(positions))
         if self.finish is not None:
-            times = self.finish(self.poses(positions), times, trellis.reach)
+            poses = self.matcher.features.plain(positions)
+            times = self.finish(poses, times, self.matcher.trellis.reach)
         return distances, times
+
+    def _matched(self, moving, coupling=None):
+        """Distances of direct paths, and voted and smoothed times, of features of trials."""
+        trellis, bases, base = self.matcher.trellis, self.bases, self.bases.sequences[0]
+        disparities = trellis.paths(bases, moving, coupling=coupling)
+        distances = trellis.costs(base, moving, disparities[0])
+        routes = _towards(bases, times_of(disparities), coupling)
+        if self.smoothing is None:
+            return distances, routes[0]
+        voted = vote(routes[0], self.to_exemplars[:, np.newaxis], routes[1:])
+        if coupling is None:
+            times = smooth_warps(voted, trellis.reach, self.smoothing)
+        else:
+            share, offsets = _share(bases, coupling), coupling.offsets[0]
+            times = smooth_warps(voted, trellis.reach, self.smoothing, share * offsets)
+            # A strong coupling leaves nothing, also where the given warp is steeper than a path.
+            times += share**2 * (offsets + np.arange(times.shape[1]) - times)
+        # A path without any distance is right: the pattern keeps its own pace.
+        seen = distances
+        if trellis.unseen is not None:
+            seen = trellis.costs(base, moving, disparities[0], unseen=0.0)
+        rounding = 64 * np.finfo(moving.dtype).eps * bases.energy[0]
+        return distances, np.where((seen <= rounding)[:, np.newaxis], routes[0], times)
 
     def direct_warps(self, positions):
         """Warps of trials by their direct paths alone, smoothed: (n_trials, P)."""
@@ -479,7 +467,7 @@ class Warper:
         by_paths = uncertainty_of_paths(self.matcher, base, moving, times)
         if not isinstance(self.finish, Refiner):
             return by_paths
-        errors = self.finish.standard_errors(self.poses(positions), times)
+        errors = self.finish.standard_errors(self.matcher.features.plain(positions), times)
         return refined_uncertainty(by_paths, errors)
 
     def disparity_space(self, positions):
@@ -507,3 +495,122 @@ class Warper:
             row[inside] = trellis.weighed(squares, base[p], window)
         path = trellis.paths(base[np.newaxis], moving)[0, 0]
         return frames, offsets, costs, path
+
+
+# -- the warper of a part -----------------------------------------------------------------
+
+# A part with so strong a coupling has the warp of the body; a stronger one overflows.
+_RIGID = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class PartWarper(Warper):
+    """Warps some features to the pattern of the whole body, by way of its exemplars.
+
+    Attributes
+    ----------
+    columns : ndarray of int
+        The features.
+    weight : float
+        Of the coupling, in squared features of a frame per squared frame.
+    back : ndarray, shape (1 + n_exemplars, P)
+        Inverse warps of the body from the bases: the frame of the pattern that each of their frames
+        meets.
+    """
+
+    columns: np.ndarray = field(kw_only=True)
+    weight: float = field(kw_only=True)
+    back: np.ndarray = field(kw_only=True)
+
+    @classmethod
+    def of(cls, columns, body, times, on_clock, chosen, coupling, settings):
+        """The warper of a part; None if the part does not move.
+
+        Parameters
+        ----------
+        columns : ndarray of int
+            Features of the part.
+        body : Warper
+            Of the whole body.
+        times : ndarray, shape (1 + n_exemplars, P)
+            The body's warps of the pattern and its exemplars.
+        on_clock, chosen : ndarray, shape (n_trials, P, n_features)
+            The training set, and the pattern and its exemplars in double precision: whole, not in
+            the unit.
+        coupling : float
+            ``lambda``, in mean squared features of the part, per squared per cent of the clock.
+        settings : PathSettings
+        """
+        features = body.matcher.features.part(columns, on_clock)
+        if features is None:
+            return None
+        compared = features(features.unit(on_clock[:, :, columns]))
+        matcher, n_frames = Matcher.of(features, compared, settings), len(body.pattern)
+        energy = np.square(compared).sum(axis=2, dtype=np.float64).mean()
+        weight = float(min(coupling, _RIGID) * energy * (100 / (n_frames - 1)) ** 2)
+        frames, positions = np.arange(n_frames), features.unit(chosen[:, :, columns])
+        bases = Bases(matcher.trellis, features(positions))
+        to_exemplars = Coupling(weight, times[np.newaxis, 1:] - frames) if weight else None
+        disparities = matcher.trellis.paths(
+            bases.sequences[:1], bases.sequences[1:], coupling=to_exemplars
+        )
+        return cls(
+            matcher,
+            features.plain(positions)[0],
+            bases,
+            _towards(bases, times_of(disparities), to_exemplars)[0],
+            body.smoothing,
+            columns=columns,
+            weight=weight,
+            back=np.stack([np.interp(frames, t, frames) for t in times]),
+        )
+
+    def positions(self, arrays):
+        """Whole trials on the clock, in double precision, not in the unit."""
+        arrays = [x.astype(np.float64, copy=False) for x in arrays]
+        return normalise(arrays, len(self.pattern))
+
+    def warps(self, positions, body_times):
+        """Distances of the direct paths to the pattern, and times ``tau``, of some trials.
+
+        The coupling draws the paths. Its costs do not count for the distances.
+
+        Parameters
+        ----------
+        positions : ndarray, shape (n_trials, P, n_features)
+            Whole trials on the clock, in double precision, not in the unit.
+        body_times : ndarray, shape (n_trials, P)
+            The warps of the whole bodies.
+        """
+        features = self.matcher.features
+        moving = features(features.unit(positions[:, :, self.columns]))
+        return self._matched(moving, self._coupling(body_times))
+
+    def _coupling(self, body_times):
+        """The coupling of the paths from all bases; None if there is none.
+
+        A path from the pattern is coupled to the body's warp, and one from an exemplar to the
+        body's warp from there.
+        """
+        if not self.weight:
+            return None
+        at = np.broadcast_to(self.back[:, np.newaxis], (len(self.back), *body_times.shape))
+        from_bases = evaluate_warps(np.broadcast_to(body_times, at.shape), at)
+        return Coupling(self.weight, from_bases - np.arange(body_times.shape[1]))
+
+
+def _towards(bases, times, coupling):
+    """Times (n_bases, n_trials, P) of coupled paths, between the steps of the trellis.
+
+    Of the distance to the given offsets, half a step at most, they go the share of the coupling.
+    """
+    if coupling is None:
+        return times
+    distance = coupling.offsets + np.arange(times.shape[-1]) - times
+    return times + _share(bases, coupling) * np.clip(distance, -0.5, 0.5)
+
+
+def _share(bases, coupling):
+    """The share w / (w + c) of a coupling of weight w, for features of mean squared slope c."""
+    slope = np.square(np.diff(bases.sequences, axis=1)).sum(axis=2).mean(dtype=np.float64)
+    return coupling.weight / (coupling.weight + slope)

@@ -24,8 +24,6 @@ __all__ = [
     "SAME_SOURCE",
     "Refiner",
     "curvature",
-    "refine_warps",
-    "standard_errors",
     "typical_energy",
     "unexplained_variance",
 ]
@@ -61,14 +59,120 @@ class Refiner(NamedTuple):
         return cls(_smoothed(pattern[np.newaxis], noise_width)[0], noise_width)
 
     def __call__(self, poses, times, reach):
-        """Refined warps (n_trials, P) of poses (n_trials, P, n_features)."""
-        poses = _smoothed(poses, self.noise_width)
-        return refine_warps(self.pattern, poses, times, reach, self.noise_width)
+        """Gauss-Newton steps along the tangent that bring matched postures together.
+
+        Each step solves for the whole warp at once::
+
+            sum_p |x_n(p) - g x_m(tau) - o - g x_m'(tau) (tau_new - tau)|^2 / s^2
+                + sum_p (tau_new''(p) / q)^2
+
+        with a gain g and an offset o for every feature, the noise s of a feature measured from the
+        residuals, and q the change of rate to be expected. The ends stay pinned, the warp stays
+        non-decreasing and in the band; the largest rate of the trellis does not bind it.
+
+        Parameters
+        ----------
+        poses : ndarray, shape (n_trials, P, n_features)
+        times : ndarray, shape (n_trials, P)
+            Initial warps.
+        reach : float
+            Largest offset, in frames.
+
+        Returns
+        -------
+        ndarray, shape (n_trials, P)
+        """
+        n_frames = times.shape[1]
+        if n_frames < 5:
+            return times
+        moving = _smoothed(poses, self.noise_width)
+        base, frames = self.pattern[np.newaxis], np.arange(n_frames)
+        low, high = np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames - 1)
+        energy = np.square(base - base.mean(axis=1, keepdims=True)).sum(axis=(1, 2))
+        rounding = np.square(16 * np.finfo(base.dtype).eps) * energy / n_frames
+        splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype, copy=False)
+        splines = np.ascontiguousarray(splines.transpose(2, 1, 0, 3))
+        refined = times.astype(np.float64)
+        active, (band, border) = np.arange(len(moving)), curvature(n_frames)
+        for _ in range(MAX_STEPS):
+            values, tangents = _evaluate(splines, active, refined[active])
+            fitted, gain = _fit_gain(base, values)
+            slope, residual = gain * tangents, base - fitted
+            noise = typical_energy(residual, self._independent(n_frames)) / n_frames
+            pull = np.vecdot(slope, slope)[:, 1:-1]
+            going = (noise > rounding) & pull.any(axis=1)
+            active, noise, pull = active[going], noise[going], pull[going]
+            if len(active) == 0:
+                break
+            push = np.vecdot(slope, residual)[going, 1:-1]
+            stiffness = np.maximum(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull.mean(axis=1))
+            tau = refined[active]
+            # The systems of all warps, one below the other, are a single banded one.
+            system = band[:, np.newaxis] * stiffness[:, np.newaxis]
+            system[-1] += pull
+            target = pull * tau[:, 1:-1] + push - stiffness[:, np.newaxis] * border
+            solved = solveh_banded(system.reshape(3, -1), target.ravel())
+            step = solved.reshape(pull.shape) - tau[:, 1:-1]
+            tau[:, 1:-1] += step
+            refined[active] = np.maximum.accumulate(np.clip(tau, low, high), axis=1)
+            active = active[np.abs(step).max(axis=1) >= _SHORTEST_STEP]
+        return refined
 
     def standard_errors(self, poses, times):
-        """Standard errors of refined warps, in frames: (n_trials, P)."""
-        poses = _smoothed(poses, self.noise_width)
-        return standard_errors(self.pattern, poses, times, self.noise_width)
+        """Standard errors of refined warps, in frames: (n_trials, P).
+
+        The warp solves linear equations, with matrix A and right side y. Its covariance is
+        ``A^-1 Cov(y) A^-1``. The squared slopes in y hold noise. The matrix has the inner products
+        of the slopes of base and moving sequence instead, whose noise is independent. Noise that is
+        the same for several frames counts by how many: the sum of its autocorrelation.
+
+        Parameters
+        ----------
+        poses : ndarray, shape (n_trials, P, n_features)
+        times : ndarray, shape (n_trials, P)
+            Refined warps.
+        """
+        n_frames, errors, base = times.shape[1], np.zeros(times.shape), self.pattern
+        if n_frames < 5:
+            return errors
+        frames, (band, _) = np.arange(n_frames), curvature(n_frames)
+        lags = np.arange(1, math.ceil(LONGEST_LAG * n_frames))
+        share = 1 - lags / (LONGEST_LAG * n_frames)
+        base_slope = CubicSpline(frames, base)(frames, 1)
+        width = max(SMOOTHING * (n_frames - 1), LEAST_SIGMA)
+        for x, tau, row in zip(_smoothed(poses, self.noise_width), times, errors, strict=True):
+            spline = CubicSpline(frames, x)
+            fitted, gain = _fit_gain(base[np.newaxis], spline(tau)[np.newaxis])
+            residual, slope = base - fitted[0], gain[0] * spline(tau, 1)
+            noise = typical_energy(residual[np.newaxis], self._independent(n_frames))[0] / n_frames
+            pull = np.vecdot(slope, slope)
+            if not (noise > 0 and pull[1:-1].any()):
+                continue
+            stiffness = max(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull[1:-1].mean())
+            rates = np.maximum(np.gradient(tau), _SLOWEST)
+            pulls = np.stack([pull, np.vecdot(slope, base_slope) / rates])[..., np.newaxis]
+            total, common = smooth(pulls, width)[:, 1:-1, 0]
+            pull = pull[1:-1]
+            total = np.maximum(total, np.finfo(total.dtype).tiny)
+            clean = pull * np.clip(common / total, _LEAST_SIGNAL, 1)
+            system = band * stiffness
+            system[-1] += clean
+            inverse = solveh_banded(system, np.eye(n_frames - 2))
+            variance = np.diagonal(inverse) + np.square(inverse) @ (pull - clean)
+            spectrum = np.square(np.abs(np.fft.rfft(residual, 2 * n_frames, axis=0))).sum(axis=1)
+            related = np.fft.irfft(spectrum)
+            dependent = 1 + 2 * (share @ related[lags]) / (related[0] or 1)
+            dependent = max(dependent, 1, 2 * math.sqrt(math.pi) * self.noise_width)
+            # What the warp, gains and offsets have taken away from the residuals.
+            features = np.square(residual).sum() / (n_frames * noise)
+            degrees = np.diagonal(inverse) @ clean + 2 * features
+            share_left = 1 - degrees * dependent / (features * n_frames)
+            row[1:-1] = np.sqrt(noise / max(share_left, 0.5) * dependent * variance)
+        return errors
+
+    def _independent(self, n_frames):
+        """Frames of white noise that estimate a covariance as well as these under the Gaussian."""
+        return n_frames / max(1, np.sqrt(2 * np.pi) * self.noise_width)
 
 
 def _smoothed(poses, width):
@@ -98,132 +202,6 @@ def unexplained_variance(pattern, aligned, noise):
     moving = np.maximum(pattern.var(axis=0) - noise, 0).sum()
     share = np.median(np.maximum(remaining, 0).sum(axis=1))
     return float(share / moving) if moving > 0 else math.inf
-
-
-def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MAX_STEPS):
-    """Gauss-Newton steps along the tangent that bring matched postures together.
-
-    Each step solves for the whole warp at once::
-
-        sum_p |x_n(p) - g x_m(tau) - o - g x_m'(tau) (tau_new - tau)|^2 / s^2
-            + sum_p (tau_new''(p) / q)^2
-
-    with a gain g and an offset o for every feature, the noise s of a feature measured from the
-    residuals, and q the change of rate to be expected. The ends stay pinned, the warp stays
-    non-decreasing and in the band; the largest rate of the trellis does not bind it.
-
-    Parameters
-    ----------
-    base : ndarray, shape (P, n_features) or (n_sequences, P, n_features)
-        One for all, or one for each. Features that are 0 do not count.
-    moving : ndarray, shape (n_sequences, P, n_features)
-    times : ndarray, shape (n_sequences, P)
-        Initial warps.
-    reach : float
-        Largest offset, in frames.
-    noise_width : float, default=0.0
-        Width of the smoothing of the postures, in frames.
-    steps : int, default=20
-        Largest number of steps.
-
-    Returns
-    -------
-    ndarray, shape (n_sequences, P)
-    """
-    n_frames = times.shape[1]
-    if n_frames < 5:
-        return times
-    base, frames = base if base.ndim == 3 else base[np.newaxis], np.arange(n_frames)
-    low, high = np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames - 1)
-    energy = np.square(base - base.mean(axis=1, keepdims=True)).sum(axis=(1, 2))
-    rounding = np.square(16 * np.finfo(base.dtype).eps) * energy / n_frames
-    splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype, copy=False)
-    splines = np.ascontiguousarray(splines.transpose(2, 1, 0, 3))
-    # Frames of white noise that estimate a covariance as well as these under a Gaussian filter.
-    independent = n_frames / max(1, np.sqrt(2 * np.pi) * noise_width)
-    refined = times.astype(np.float64)
-    active, (band, border) = np.arange(len(moving)), curvature(n_frames)
-    for _ in range(steps):
-        chosen = slice(None) if len(base) == 1 else active
-        values, tangents = _evaluate(splines, active, refined[active])
-        fitted, gain = _fit_gain(base[chosen], values)
-        slope, residual = gain * tangents, base[chosen] - fitted
-        noise = typical_energy(residual, independent) / n_frames
-        pull = np.vecdot(slope, slope)[:, 1:-1]
-        going = (noise > rounding[chosen]) & pull.any(axis=1)
-        active, noise, pull = active[going], noise[going], pull[going]
-        if len(active) == 0:
-            break
-        push = np.vecdot(slope, residual)[going, 1:-1]
-        stiffness = np.maximum(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull.mean(axis=1))
-        tau = refined[active]
-        # The systems of all warps, one below the other, are a single banded one.
-        system = band[:, np.newaxis] * stiffness[:, np.newaxis]
-        system[-1] += pull
-        target = pull * tau[:, 1:-1] + push - stiffness[:, np.newaxis] * border
-        solved = solveh_banded(system.reshape(3, -1), target.ravel())
-        step = solved.reshape(pull.shape) - tau[:, 1:-1]
-        tau[:, 1:-1] += step
-        refined[active] = np.maximum.accumulate(np.clip(tau, low, high), axis=1)
-        active = active[np.abs(step).max(axis=1) >= _SHORTEST_STEP]
-    return refined
-
-
-def standard_errors(base, moving, times, noise_width=0.0):
-    """Standard errors of refined warps, in frames: (n_sequences, P).
-
-    The warp solves linear equations, with matrix A and right side y. Its covariance is
-    ``A^-1 Cov(y) A^-1``. The squared slopes in y hold noise. The matrix has the inner products of
-    the slopes of base and moving sequence instead, whose noise is independent. Noise that is the
-    same for several frames counts by how many: the sum of its autocorrelation.
-
-    Parameters
-    ----------
-    base : ndarray, shape (P, n_features)
-    moving : ndarray, shape (n_sequences, P, n_features)
-    times : ndarray, shape (n_sequences, P)
-        Refined warps.
-    noise_width : float, default=0.0
-        Width of the smoothing of the postures, in frames.
-    """
-    n_frames, errors = times.shape[1], np.zeros(times.shape)
-    if n_frames < 5:
-        return errors
-    frames, (band, _) = np.arange(n_frames), curvature(n_frames)
-    independent = n_frames / max(1, np.sqrt(2 * np.pi) * noise_width)
-    lags = np.arange(1, math.ceil(LONGEST_LAG * n_frames))
-    share = 1 - lags / (LONGEST_LAG * n_frames)
-    base_slope = CubicSpline(frames, base)(frames, 1)
-    width = max(SMOOTHING * (n_frames - 1), LEAST_SIGMA)
-    for x, tau, row in zip(moving, times, errors, strict=True):
-        spline = CubicSpline(frames, x)
-        fitted, gain = _fit_gain(base[np.newaxis], spline(tau)[np.newaxis])
-        residual, slope = base - fitted[0], gain[0] * spline(tau, 1)
-        noise = typical_energy(residual[np.newaxis], independent)[0] / n_frames
-        pull = np.vecdot(slope, slope)
-        if not (noise > 0 and pull[1:-1].any()):
-            continue
-        stiffness = max(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull[1:-1].mean())
-        rates = np.maximum(np.gradient(tau), _SLOWEST)
-        pulls = np.stack([pull, np.vecdot(slope, base_slope) / rates])[..., np.newaxis]
-        total, common = smooth(pulls, width)[:, 1:-1, 0]
-        pull = pull[1:-1]
-        total = np.maximum(total, np.finfo(total.dtype).tiny)
-        clean = pull * np.clip(common / total, _LEAST_SIGNAL, 1)
-        system = band * stiffness
-        system[-1] += clean
-        inverse = solveh_banded(system, np.eye(n_frames - 2))
-        variance = np.diagonal(inverse) + np.square(inverse) @ (pull - clean)
-        spectrum = np.square(np.abs(np.fft.rfft(residual, 2 * n_frames, axis=0))).sum(axis=1)
-        related = np.fft.irfft(spectrum)
-        dependent = 1 + 2 * (share @ related[lags]) / (related[0] or 1)
-        dependent = max(dependent, 1, 2 * math.sqrt(math.pi) * noise_width)
-        # What the warp, gains and offsets have taken away from the residuals.
-        features = np.square(residual).sum() / (n_frames * noise)
-        degrees = np.diagonal(inverse) @ clean + 2 * features
-        share_left = 1 - degrees * dependent / (features * n_frames)
-        row[1:-1] = np.sqrt(noise / max(share_left, 0.5) * dependent * variance)
-    return errors
 
 
 def _evaluate(splines, active, times):

@@ -60,11 +60,6 @@ class Coupling(NamedTuple):
     weight: float
     offsets: np.ndarray
 
-    def cost(self, times):
-        """Penalties (n_bases, n_moving) of warps ``tau`` of all pairs, (n_bases, n_moving, P)."""
-        deviations = times - np.arange(times.shape[-1]) - self.offsets
-        return self.weight * np.square(deviations).sum(axis=-1)
-
 
 class Trellis:
     """The disparity-space trellis (Fig. 2) of base sequences against moving ones.

@@ -11,7 +11,6 @@ import pandas as pd
 
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import refuse_seconds
-from ..inputs.resampling import as_frame_rates
 from ..inputs.types import Indexed, NumbersLike, ValuesLike
 from ..inputs.wording import counted
 from ..matching.warps import evaluate_warps
@@ -78,8 +77,6 @@ def keyframe_error(
     keyframes: NumbersLike,
     pattern_keyframes: ValuesLike,
     n_frames: ValuesLike,
-    *,
-    frame_rate: float | ValuesLike | None = None,
 ) -> float:
     """Mean absolute difference between matched and true key-frames.
 
@@ -96,27 +93,23 @@ def keyframe_error(
         Those of the pattern, in frames of the clock, from 0 to ``P - 1``, increasing.
     n_frames : array-like of int, shape (n_sequences,)
         Lengths of the performances, at least 2.
-    frame_rate : float or array-like of shape (n_sequences,), default=None
-        Frames a second of the performances. If given, the error is in seconds.
 
     Returns
     -------
     float
-        The error in frames of the clock, or in seconds.
+        The error in frames of the clock.
 
     Raises
     ------
     ValueError
-        If the numbers of warps, key-frames and lengths differ, a key-frame is outside its
-        performance, or a frame rate is not above 0.
+        If the numbers of warps, key-frames and lengths differ, or a key-frame is outside its
+        performance.
 
     Examples
     --------
     >>> from sklearn_motionsync.metrics import keyframe_error
     >>> keyframe_error([[0, 1, 2, 3, 4]], [[5]], [2], [9])
     0.5
-    >>> keyframe_error([[0, 1, 2, 3, 4]], [[5]], [2], [9], frame_rate=10)
-    0.1
     """
     times = _as_warps(times)
     n_sequences, P = times.shape
@@ -124,10 +117,7 @@ def keyframe_error(
     keyframes, pattern_keyframes = _as_keyframes(keyframes, pattern_keyframes, lengths, P)
     frames_per_step = (lengths[:, np.newaxis] - 1) / (P - 1)
     matched = evaluate_warps(times, np.tile(pattern_keyframes, (n_sequences, 1)))
-    errors = np.abs(matched - keyframes / frames_per_step)
-    if frame_rate is not None:
-        errors = errors * frames_per_step / as_frame_rates(frame_rate, n_sequences)
-    return float(errors.mean())
+    return float(np.abs(matched - keyframes / frames_per_step).mean())
 
 
 # -- checks of arguments ------------------------------------------------------------------

@@ -52,25 +52,6 @@ class _SynchronizerScorer(BaseEstimator):
         -------
         SpreadScorer or FeatureHoldoutScorer
             The scorer itself.
-
-        Examples
-        --------
-        >>> from sklearn import config_context
-        >>> from sklearn.model_selection import cross_val_score
-        >>> from sklearn_motionsync import LinearSynchronizer
-        >>> from sklearn_motionsync.datasets import make_bending
-        >>> from sklearn_motionsync.metrics import SpreadScorer
-        >>> bunch = make_bending(8, random_state=0)
-        >>> with config_context(enable_metadata_routing=True):
-        ...     scores = cross_val_score(
-        ...         LinearSynchronizer(40).set_fit_request(keyframes=True),
-        ...         bunch.data,
-        ...         cv=2,
-        ...         scoring=SpreadScorer().set_score_request(keyframes=True),
-        ...         params={"keyframes": bunch.keyframes},
-        ...     )
-        >>> scores.shape
-        (2,)
         """
         if not get_config()["enable_metadata_routing"]:
             raise RuntimeError(

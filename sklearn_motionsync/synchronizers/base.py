@@ -302,14 +302,11 @@ class Synchronizer(
             n_trials, portions = source
             performances, out = self._warp_parts(n_trials, portions)
         if fill == "model" and is_gappy(out):
-            fill_warped(out, self._warp_part(self._checked_examples()))
+            examples = Performances(list(self.examples_), "list", list(range(len(self.examples_))))
+            fill_warped(out, self._warp_part(examples))
         if performances.kind == "rows":
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(out.shape[1]))
-
-    def _checked_examples(self):
-        """The examples as performances."""
-        return Performances(list(self.examples_), "list", list(range(len(self.examples_))))
 
     def _warp_part(self, performances, **params):
         return self._match(performances, **params).warp(performances)
@@ -473,10 +470,7 @@ class AnchoredSynchronizer(Synchronizer):
             if keyframes is not None:
                 refuse_moved_events(X)
                 rows = Keyframes(keyframes, training.population, frame_rate)
-                shares = rows.known(training.trials)
-                training = TrainingSet(
-                    training.trials, training.filler, training.population, shares
-                )
+                training = training._replace(keyframes=rows.known(training.trials))
             elif frame_rate is not None:
                 as_frame_rates(frame_rate)
             learnt = self._learn(training, progress)

@@ -410,15 +410,17 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     def _match(self, performances, keyframes=None, frame_rate=None):
         arrays, shares = self._for_warper(performances, keyframes, frame_rate)
-        distances, times = self._distances_and_times(arrays, shares)
-        distances = self._warper.matcher.features.back(distances)
+        distances, times = warp_in_portions(
+            self._warper, arrays, n_jobs=self.n_jobs, begin=self._progress, name="warping"
+        )
         pinned = None
         if shares is not None and self.keyframe_std == 0:
+            times = pin(times, self.keyframes_, shares * (self.n_frames_ - 1))
             pinned = self.keyframes_, np.isfinite(shares)
         intervals = intervals_of(
             self._warper, arrays, times, self.interval_factor_, self.evidence_, pinned
         )
-        return Match(times, distances, intervals)
+        return Match(times, self._warper.matcher.features.back(distances), intervals)
 
     def calibrate(
         self,
@@ -474,14 +476,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
         if shares is None:
             shares = np.full((len(trials), len(self.keyframes_)), np.nan)
         return add_ramps(arrays, shares), shares
-
-    def _distances_and_times(self, arrays, shares):
-        distances, times = warp_in_portions(
-            self._warper, arrays, n_jobs=self.n_jobs, begin=self._progress, name="warping"
-        )
-        if shares is None or self.keyframe_std > 0:
-            return distances, times
-        return distances, pin(times, self.keyframes_, shares * (self.n_frames_ - 1))
 
     def disparity_space(
         self,

@@ -107,9 +107,9 @@ def learn_metric(clock, *, cost, metric, consensus, smoothness, max_offset, max_
         plain = plain.replace(velocity_smoothing=SMOOTHING)
         settings = PathSettings(smoothness, narrow, max_rate)
         return MetricStep(plain, settings, None, weigh_evidence(None, 0))
-    described = Bunch(share=learnt.share, energy=learnt.energy, performances=rows)
-    evidence = weigh_evidence(learnt.evidence, len(rows))
-    return MetricStep(learnt.features, settings, described, evidence)
+    features, share, energy, evidence = learnt
+    described = Bunch(share=share, energy=energy, performances=rows)
+    return MetricStep(features, settings, described, weigh_evidence(evidence, len(rows)))
 
 
 # -- step 3: all pairs are matched ------------------------------------------------------------

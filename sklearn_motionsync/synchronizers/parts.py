@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from numbers import Real
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
+from scipy.stats import t as student
 from sklearn.base import clone
 from sklearn.utils._param_validation import Interval
 
@@ -23,24 +26,22 @@ from ..inputs.types import (
     ValuesLike,
 )
 from ..inputs.validation import names_of_input
+from ..inputs.wording import counted
 from ..matching.anchors import add_ramps
-from ..matching.consensus import smooth_warps, vote
+from ..matching.counting import whole
 from ..matching.gaps import add_weights
-from ..matching.matcher import Matcher, Warper, times_of
-from ..matching.tile import Bases
-from ..matching.trellis import Coupling
-from ..matching.warps import evaluate_warps, normalise
+from ..matching.matcher import PartWarper
+from ..matching.warps import normalise
 from ..utils.groups import encode_groups
 from ..utils.parallel import Progress, one_blas_thread, run
 from ..utils.parameters import validated_with_nested
 from .base import AnchoredSynchronizer
 from .dense import DenseSynchronizer
-from .lags import Lags, common_delay, share_apart
 from .learning import MOST_LEARNT, warp_in_portions
-from .match import Match, rates_of
+from .match import Match, rates_of, timing_table
 from .training import with_confidence
 
-__all__ = ["PartSynchronizer"]
+__all__ = ["Lags", "PartSynchronizer"]
 
 # What is in no part; no part may have this name.
 _REST = "rest"
@@ -444,139 +445,197 @@ def choose_parts(parts, performances, names):
     return chosen
 
 
-# -- the warper of a part -----------------------------------------------------------------
-
-# A part with so strong a coupling has the warp of the body; a stronger one overflows.
-_RIGID = 1e6
-
-
 def _warps_of_part(warper, positions, body):
     return warper.warps(positions, body)[1]
 
 
-@dataclass(frozen=True, eq=False)
-class PartWarper(Warper):
-    """Warps some features to the pattern of the whole body, by way of its exemplars.
+# -- lags, and what parts have in common --------------------------------------------------
 
-    Attributes
+# Level of the confidence intervals.
+_CONFIDENCE = 0.95
+
+
+class Lags(NamedTuple):
+    """How much later than the rest of the body each part is, at every frame of the pattern.
+
+    `PartSynchronizer.lags` returns them. Lags are counted from the mean of the training
+    performances. Their spread shows whether a lag is a habit of subjects or varies from performance
+    to performance.
+
+    Parameters
     ----------
-    columns : ndarray of int
-        The features.
-    weight : float
-        Of the coupling, in squared features of a frame per squared frame.
-    back : ndarray, shape (1 + n_exemplars, P)
-        Inverse warps of the body from the bases: the frame of the pattern that each of their frames
-        meets.
+    values : ndarray, shape (n_sequences, n_parts, P)
+        The lags: positive where a part is late, negative where it leads.
+    parts : list of str
+        Names of the parts.
+    unit : {"frames", "percent", "seconds"}
+        Unit of the values.
+    groups : ndarray of int, shape (n_sequences,), default=None
+        The subject of every performance, counted from 0.
+    people : list, default=None
+        Labels of the subjects.
+    labels : list, default=None
+        Labels of the performances.
+
+    Examples
+    --------
+    Two subjects, two performances each. The arm of the second is always late by 4 frames.
+
+    >>> import numpy as np
+    >>> from sklearn_motionsync import Lags
+    >>> values = np.repeat([0.0, 0.2, 4.0, 4.4], 5).reshape(4, 1, 5)
+    >>> groups = np.array([0, 0, 1, 1])
+    >>> lags = Lags(values, ["arm"], "frames", groups, ["ann", "bob"])
+    >>> lags.summary()[["mean", "sd_within", "sd_between", "icc"]].round(2)
+          mean  sd_within  sd_between   icc
+    part
+    arm   2.15       0.22        2.89  0.99
+
+    Two subjects do not determine the mean of the population:
+
+    >>> lags.summary()[["low", "high"]].round().to_numpy().tolist()
+    [[-24.0, 28.0]]
     """
 
-    columns: np.ndarray = field(kw_only=True)
-    weight: float = field(kw_only=True)
-    back: np.ndarray = field(kw_only=True)
+    values: np.ndarray
+    parts: list[str]
+    unit: Unit
+    groups: np.ndarray | None = None
+    people: list | None = None
+    labels: list | None = None
 
-    @classmethod
-    def of(cls, columns, body, times, on_clock, chosen, coupling, settings):
-        """The warper of a part; None if the part does not move.
+    def summary(self) -> pd.DataFrame:
+        """The mean lag of a performance over the clock, and its spread, part by part.
 
-        Parameters
-        ----------
-        columns : ndarray of int
-            Features of the part.
-        body : Warper
-            Of the whole body.
-        times : ndarray, shape (1 + n_exemplars, P)
-            The body's warps of the pattern and its exemplars.
-        on_clock, chosen : ndarray, shape (n_trials, P, n_features)
-            The training set, and the pattern and its exemplars in double precision: whole, not in
-            the unit.
-        coupling : float
-            ``lambda``, in mean squared features of the part, per squared per cent of the clock.
-        settings : PathSettings
+        Returns
+        -------
+        DataFrame
+            A row a part. ``mean`` over performances, or with groups over the means of subjects;
+            ``sd`` over performances; ``low`` and ``high``, the 95 % confidence interval of the
+            mean, by the t distribution over subjects, or over performances without groups. With
+            groups also a one-way analysis of variance: ``sd_within`` and ``sd_between`` subjects,
+            and ``icc``, the share of the variance between subjects, ICC(1,1): near 1 for a habit,
+            near 0 for a lag that varies. NaN where there are too few performances or subjects.
         """
-        features = body.matcher.features.part(columns, on_clock)
-        if features is None:
-            return None
-        compared = features(features.unit(on_clock[:, :, columns]))
-        matcher, n_frames = Matcher.of(features, compared, settings), len(body.pattern)
-        energy = np.square(compared).sum(axis=2, dtype=np.float64).mean()
-        weight = float(min(coupling, _RIGID) * energy * (100 / (n_frames - 1)) ** 2)
-        frames, positions = np.arange(n_frames), features.unit(chosen[:, :, columns])
-        bases = Bases(matcher.trellis, features(positions))
-        to_exemplars = Coupling(weight, times[np.newaxis, 1:] - frames) if weight else None
-        disparities = matcher.trellis.paths(
-            bases.sequences[:1], bases.sequences[1:], coupling=to_exemplars
+        columns = self._spread(self.values.mean(axis=2))
+        return pd.DataFrame(columns, index=pd.Index(self.parts, name="part"))
+
+    def over_time(self) -> pd.DataFrame:
+        """The lag at every frame of the pattern, and its spread.
+
+        Returns
+        -------
+        DataFrame
+            A row a part and frame, columns as in ``summary``. Intervals are pointwise: at 5 % of
+            the frames they miss the mean by chance.
+        """
+        n_frames = self.values.shape[2]
+        index = pd.MultiIndex.from_product([self.parts, range(n_frames)], names=["part", "frame"])
+        columns = self._spread(self.values.reshape(len(self.values), -1))
+        return pd.DataFrame(columns, index=index)
+
+    def to_frame(self) -> pd.DataFrame:
+        """All lags as a table, such as for a CSV file.
+
+        Returns
+        -------
+        DataFrame
+            A row a performance and frame of the pattern, a column a part.
+        """
+        columns = {part: self.values[:, i] for i, part in enumerate(self.parts)}
+        return timing_table(columns, None, self.labels)
+
+    def __repr__(self):
+        n_sequences, n_parts, n_frames = self.values.shape
+        return (
+            f"Lags({counted(n_parts, 'part')} of {counted(n_sequences, 'performance')} on "
+            f"{n_frames} frames, in {self.unit})"
         )
-        return cls(
-            matcher,
-            features.plain(positions)[0],
-            bases,
-            _towards(bases, times_of(disparities), to_exemplars)[0],
-            body.smoothing,
-            columns=columns,
-            weight=weight,
-            back=np.stack([np.interp(frames, t, frames) for t in times]),
-        )
 
-    def positions(self, arrays):
-        """Whole trials on the clock, in double precision, not in the unit."""
-        arrays = [x.astype(np.float64, copy=False) for x in arrays]
-        return normalise(arrays, len(self.pattern))
-
-    def warps(self, positions, body_times):
-        """Distances of the direct paths to the pattern, and times ``tau``, of some trials.
-
-        The coupling draws the paths. Its costs do not count for the distances.
-
-        Parameters
-        ----------
-        positions : ndarray, shape (n_trials, P, n_features)
-            Whole trials on the clock, in double precision, not in the unit.
-        body_times : ndarray, shape (n_trials, P)
-            The warps of the whole bodies.
-        """
-        trellis, bases = self.matcher.trellis, self.bases
-        coupling = self._coupling(body_times)
-        if coupling is None:
-            return super().warps(self.matcher.features.unit(positions[:, :, self.columns]))
-        moving = self.matcher.features(self.matcher.features.unit(positions[:, :, self.columns]))
-        disparities = trellis.paths(bases, moving, coupling=coupling)
-        distances = trellis.costs(bases.sequences[0], moving, disparities[0])
-        routes = _towards(bases, times_of(disparities), coupling)
-        if self.smoothing is None:
-            return distances, routes[0]
-        voted = vote(routes[0], self.to_exemplars[:, np.newaxis], routes[1:])
-        share, offsets = _share(bases, coupling), coupling.offsets[0]
-        times = smooth_warps(voted, trellis.reach, self.smoothing, share * offsets)
-        # A strong coupling leaves nothing, also where the given warp is steeper than a path.
-        times += share**2 * (offsets + np.arange(times.shape[1]) - times)
-        # A path without any distance is right: the pattern keeps its own pace.
-        rounding = 64 * np.finfo(positions.dtype).eps * bases.energy[0]
-        return distances, np.where((distances <= rounding)[:, np.newaxis], routes[0], times)
-
-    def _coupling(self, body_times):
-        """The coupling of the paths from all bases; None if there is none.
-
-        A path from the pattern is coupled to the body's warp, and one from an exemplar to the
-        body's warp from there.
-        """
-        if not self.weight:
-            return None
-        at = np.broadcast_to(self.back[:, np.newaxis], (len(self.back), *body_times.shape))
-        from_bases = evaluate_warps(np.broadcast_to(body_times, at.shape), at)
-        return Coupling(self.weight, from_bases - np.arange(body_times.shape[1]))
+    def _spread(self, values):
+        """Mean and spread of columns of values (n_sequences, n_columns), by name."""
+        if self.groups is None:
+            mean, sd, n = values.mean(axis=0), _sd(values), len(values)
+            return {"mean": mean, "sd": sd, **_interval(mean, sd, n)}
+        counts = np.bincount(self.groups)
+        means = np.stack([values[self.groups == g].mean(axis=0) for g in range(len(counts))])
+        mean = means.mean(axis=0)
+        within, between = _components(values, means, self.groups, counts)
+        with np.errstate(invalid="ignore"):
+            icc = between / (between + within)
+        return {
+            "mean": mean,
+            "sd": _sd(values),
+            **_interval(mean, _sd(means), len(means)),
+            "sd_within": np.sqrt(within),
+            "sd_between": np.sqrt(between),
+            "icc": icc,
+        }
 
 
-def _towards(bases, times, coupling):
-    """Times (n_bases, n_trials, P) of coupled paths, between the steps of the trellis.
+def common_delay(offsets, apart):
+    """What several parts have in common: what nearly all of them are late by, or early; or 0.
 
-    Of the distance to the given offsets, half a step at most, they go the share of the coupling.
+    It minimises the sum of the distances from all offsets, and, ``apart`` times as often, from 0;
+    of equally good ones it is the farthest from 0. So a part that is shifted hardly moves it.
+
+    Parameters
+    ----------
+    offsets : list of ndarray, shape (n_sequences, P)
+        Of each part, counted from their means.
+    apart : float
+        From 0, where all parts of people have one offset, to 1, where they differ as much as they
+        share.
+
+    Returns
+    -------
+    ndarray, shape (n_sequences, P); or 0.0, if there are no parts
     """
-    if coupling is None:
-        return times
-    distance = coupling.offsets + np.arange(times.shape[-1]) - times
-    return times + _share(bases, coupling) * np.clip(distance, -0.5, 0.5)
+    if not offsets:
+        return 0.0
+    count = len(offsets)
+    agree = max(whole((1 + apart) / 2 * count, "up"), count // 2 + 1)
+    ranked = np.sort(offsets, axis=0)
+    return np.maximum(ranked[count - agree], 0) + np.minimum(ranked[agree - 1], 0)
 
 
-def _share(bases, coupling):
-    """The share w / (w + c) of a coupling of weight w, for features of mean squared slope c."""
-    slope = np.square(np.diff(bases.sequences, axis=1)).sum(axis=2).mean(dtype=np.float64)
-    return coupling.weight / (coupling.weight + slope)
+def share_apart(offsets):
+    """How far parts are from what they have in common, as a share of that; at most 1.
+
+    Parameters
+    ----------
+    offsets : ndarray, shape (n_parts, n_sequences, P)
+        Counted from their means.
+    """
+    common = np.median(offsets, axis=0)
+    apart, shared = np.abs(offsets - common).mean(), np.abs(common).mean()
+    return float(apart / shared) if apart < shared else 1.0
+
+
+def _sd(values):
+    """Standard deviations, NaN of fewer than two."""
+    return values.std(axis=0, ddof=1) if len(values) > 1 else np.full(values.shape[1], np.nan)
+
+
+def _interval(mean, sd, n):
+    """The confidence interval of a mean."""
+    quantile = student.ppf((1 + _CONFIDENCE) / 2, n - 1) if n > 1 else np.nan
+    reach = quantile * sd / np.sqrt(n)
+    return {"low": mean - reach, "high": mean + reach}
+
+
+def _components(values, own, groups, counts):
+    """Variances within and between groups of unequal counts, by a one-way analysis of variance.
+
+    NaN if no group has two performances, or there is only one group.
+    """
+    n_groups, n = len(counts), len(values)
+    within = between = np.full(values.shape[1], np.nan)
+    if n > n_groups:
+        within = np.square(values - own[groups]).sum(axis=0) / (n - n_groups)
+    if n > n_groups > 1:
+        squares = np.square(own - values.mean(axis=0))
+        mean_square = (counts[:, np.newaxis] * squares).sum(axis=0) / (n_groups - 1)
+        typical = (n - np.square(counts).sum() / n) / (n_groups - 1)
+        between = np.maximum(mean_square - within, 0) / typical
+    return within, between

@@ -39,16 +39,16 @@ def miss_cost(p, q, own, other, n_frames, n_positions, most, std):
     return total
 
 
-@pytest.mark.parametrize("kept", ["rows", "choices", "small"])
 @pytest.mark.parametrize("cost", COSTS)
-@pytest.mark.parametrize("subframes", [1, 2])
-@pytest.mark.parametrize("std", [0.0, 0.1])
-@pytest.mark.parametrize("n_bases", [1, 2])
+@pytest.mark.parametrize(("subframes", "std"), [(1, 0.0), (2, 0.1)])
+@pytest.mark.parametrize(
+    ("n_bases", "kept"), [(1, "rows"), (2, "rows"), (2, "choices"), (2, "small")]
+)
 def test_anchored_paths_equal_all_paths(cost, subframes, std, n_bases, kept, monkeypatch):
     small, rows = {"rows": (0, 10**9), "choices": (0, 0), "small": (10**6, 0)}[kept]
     monkeypatch.setattr(module, "SMALL_BYTES", [small] * 2)
     monkeypatch.setattr(module, "ROW_BYTES", rows)
-    n_frames, reach, mu, most = 6, 3, 0.3, 4.0
+    n_frames, reach, mu, most = 7 - subframes, 3, 0.3, 4.0
     n_positions = (n_frames - 1) * subframes + 1
     costs, rng = step_costs(cost, 2, subframes), np.random.default_rng(0)
     own = np.array([[0.31, 0.8], [NAN, 0.66]])[:n_bases]
@@ -106,7 +106,7 @@ def warps_and_keyframes(draw):
 JUMP = np.array([0.0] * 7 + [18.0] * 12), np.array([np.nextafter(9, 0)]), np.array([2.390625])
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @example(JUMP)
 @given(warps_and_keyframes())
 def test_pinned_warps_meet_keyframes_and_stay_warps(case):

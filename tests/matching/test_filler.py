@@ -62,7 +62,7 @@ def draw(seed, n_frames, subframes, exact):
     return out
 
 
-CASES = [(6, 2, 1, 2, 0.5, 0.25), (7, 3, 1, 3, 0.75, 0.5), (5, 2, 2, 2, 0.5, 1.0)]
+CASES = [(6, 2, 1, 2, 0.5, 0.25), (6, 3, 1, 3, 0.75, 0.5), (5, 2, 2, 2, 0.5, 1.0)]
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -34,7 +34,7 @@ def made_people(n, n_frames=30):
 # -- up to a hundred: all pairs -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 12])
+@pytest.mark.parametrize("n", [1, 2, 3, 8])
 def test_median_has_the_smallest_sum_over_all_pairs(n):
     X = np.stack(made_people(n, 15))
     sync = DenseSynchronizer(smoothness=0.1, max_offset=0.25, **PAPER).fit(X)
@@ -55,7 +55,7 @@ def test_linear_median_has_the_smallest_sum_over_all_pairs():
     assert index == sums.argmin()
 
 
-@pytest.mark.parametrize("n", [1, 2, 31, 100, 101, 500])
+@pytest.mark.parametrize("n", [1, 2, 100, 500])
 def test_ties_go_to_the_first(n):
     """Differences within rounding reject none."""
     noise = 1e-13 * np.random.default_rng(0).standard_normal(n)
@@ -74,7 +74,7 @@ def test_rounding_does_not_choose_the_pattern(method, dtype):
     rng, settings = np.random.default_rng(0), {}
     if method is DenseSynchronizer:
         settings = {**PAPER, "max_offset": 0}
-    for _ in range(40):
+    for _ in range(20):
         X = (rng.standard_normal((2, 20, 3)) + 5).astype(dtype)
         assert method(**settings).fit(X).pattern_index_ == 0
 
@@ -112,7 +112,7 @@ def test_estimates_of_sums_are_within_their_standard_errors(table):
     n, sums = len(table), table.sum(axis=1)
     others = table[~np.eye(n, dtype=bool)].reshape(n, n - 1)
     off, excess = [], []
-    for seed in range(100):
+    for seed in range(40):
         references = draw_references(n, np.random.RandomState(seed))
         of_drawn = table[:, references].sum(axis=1)
         index, estimates = median_of_sums(of_drawn, references, 0.0)
@@ -134,7 +134,7 @@ def test_estimates_of_sums_are_within_their_standard_errors(table):
 
 @pytest.fixture(scope="module")
 def many():
-    return made_people(150)
+    return made_people(130)
 
 
 @pytest.mark.parametrize("settings", [PAPER, {}], ids=["paper", "defaults"])
@@ -143,7 +143,7 @@ def test_median_of_many_is_nearly_the_most_typical(many, settings, monkeypatch):
         patch.setattr(of_median, "MOST_REFERENCES", len(many))
         sums = DenseSynchronizer(**settings).fit(many).global_distances_
     draws = []
-    for seed in range(4):
+    for seed in range(3):
         sync = DenseSynchronizer(random_state=seed, **settings).fit(many)
         assert np.isfinite(sync.global_distances_).all()
         assert sync.pattern_index_ == sync.global_distances_.argmin()
@@ -152,7 +152,7 @@ def test_median_of_many_is_nearly_the_most_typical(many, settings, monkeypatch):
         assert np.abs(np.median(ratios) - 1) < 0.1
         assert np.std(ratios) < 0.1
         draws.append(sync.global_distances_.tobytes())
-    assert len(set(draws)) == 4
+    assert len(set(draws)) == 3
     again = DenseSynchronizer(random_state=0, **settings).fit(many)
     assert again.global_distances_.tobytes() == draws[0]
 

@@ -33,8 +33,8 @@ def draw(rng, n, n_frames, subframes=1, n_features=2, whole=False):
 CASES = [
     # n_frames, max_rate, subframes, max_disparity, mu
     (6, 2, 1, 2, 0.3),
-    (7, 2, 1, 6, 0.0),
-    (7, 3, 1, 3, 0.7),
+    (6, 2, 1, 5, 0.0),
+    (6, 3, 1, 3, 0.7),
     (5, 2, 2, 2, 0.4),
     (5, 1.5, 2, 4, 0.1),
     (4, 4, 2, 3, 1.3),
@@ -136,7 +136,7 @@ def test_coupled_paths_equal_all_paths(cost, n_bases, kept):
 
 
 @pytest.mark.parametrize("cost", COSTS)
-@pytest.mark.parametrize("case", [(40, 2, 1, 10, 0.5), (33, 3, 2, 6, 0.2), (25, 4, 4, 8, 1.0)])
+@pytest.mark.parametrize("case", [(40, 2, 1, 10, 0.5), (33, 3, 2, 6, 0.2), (13, 4, 4, 4, 1.0)])
 def test_distances_equal_plain_loops(case, cost):
     n_frames, max_rate, subframes, reach, mu = case
     costs = step_costs(cost, max_rate, subframes)
@@ -234,8 +234,8 @@ def test_tiles_cover_every_pair_once(sizes, reach):
 
 
 def test_memory_grows_with_the_band():
-    """4000 frames in a band of 81: a full matrix of float64 would take 128 MB."""
-    bases, moving = draw(np.random.default_rng(5), 1, 4000, n_features=3)
+    """2000 frames in a band of 81: a full matrix of float64 would take 32 MB."""
+    bases, moving = draw(np.random.default_rng(5), 1, 2000, n_features=3)
     trellis = Trellis(step_table(), 0.5, 40)
     tracemalloc.start()
     trellis.paths(bases, moving[:1])
@@ -244,8 +244,8 @@ def test_memory_grows_with_the_band():
     trellis.paths(bases, moving[:1], max_bytes=0)
     little = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert everything < 5e6
-    assert little < 1e6
+    assert everything < 2.5e6
+    assert little < 0.6e6
 
 
 def test_read_only_inputs_are_not_written():

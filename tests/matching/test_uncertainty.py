@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from sklearn_motionsync.matching.costs import COSTS
-from sklearn_motionsync.matching.filters import smooth
 from sklearn_motionsync.matching.matcher import Features, Matcher
-from sklearn_motionsync.matching.refinement import refine_warps, standard_errors
+from sklearn_motionsync.matching.refinement import Refiner
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.matching.uncertainty import coverage_factor, uncertainty_of_paths
 
@@ -86,16 +85,15 @@ def test_standard_errors_are_those_of_repeated_noise(noise, width):
     def movement(phase):
         return np.sin(3 * waves * phase + shift)
 
-    draws = noise * rng.standard_normal((2, 150, n_frames, 8))
+    draws = noise * rng.standard_normal((2, 60, n_frames, 8))
     base, moving = movement(true) + draws[0], movement(t) + draws[1]
-    if width:
-        base, moving = smooth(base, width), smooth(moving, width)
-    times = np.tile((n_frames - 1) * true[:, 0], (150, 1))
+    times = np.tile((n_frames - 1) * true[:, 0], (60, 1))
     errors, stated = np.empty(times.shape), np.empty(times.shape)
     for i, (x, y) in enumerate(zip(base, moving, strict=True)):
-        refined = refine_warps(x, y[np.newaxis], times[i : i + 1], 20, width)
+        refiner = Refiner.of(x, width)
+        refined = refiner(y[np.newaxis], times[i : i + 1], 20)
         errors[i] = refined[0] - times[i]
-        stated[i] = standard_errors(x, y[np.newaxis], refined, width)[0]
+        stated[i] = refiner.standard_errors(y[np.newaxis], refined)[0]
     middle = slice(8, -8)
     found = np.sqrt(np.square(errors).mean(axis=0))[middle].mean()
     ratio = np.median(stated[:, middle].mean(axis=1)) / found
@@ -109,9 +107,11 @@ def test_standard_errors_of_stretches_that_stand_still():
     base = np.hstack([np.sin(4 * t), t**2])
     noise = 0.01 * np.random.default_rng(0).standard_normal((1, 80, 2))
     times = np.arange(80.0)[np.newaxis]
-    errors = standard_errors(base, base + noise * (t > 0), times)[0]
+    refiner = Refiner.of(base, 0.0)
+    errors = refiner.standard_errors(base + noise * (t > 0), times)[0]
     assert np.isfinite(errors).all()
     assert errors[10:35].mean() > 3 * errors[45:70].mean() > 0
-    np.testing.assert_allclose(standard_errors(base, base[np.newaxis], times), 0, atol=1e-8)
+    np.testing.assert_allclose(refiner.standard_errors(base[np.newaxis], times), 0, atol=1e-8)
     still = np.ones((1, 80, 2))
-    np.testing.assert_array_equal(standard_errors(still[0], still, times), 0)
+    none = Refiner.of(still[0], 0.0).standard_errors(still, times)
+    np.testing.assert_array_equal(none, 0)

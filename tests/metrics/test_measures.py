@@ -58,14 +58,6 @@ def test_measure_refuses_wrong_arguments(name, arguments, keywords, message):
 # -- warps --------------------------------------------------------------------------------
 
 
-def test_frame_rate():
-    arguments, oracle, _ = CASES["keyframe_error"]
-    expected = oracle(*arguments, frame_rate=50)
-    np.testing.assert_allclose(keyframe_error(*arguments, frame_rate=50), expected)
-    error = keyframe_error(FIVE * 2, [[5], [5]], [2], [9, 9], frame_rate=[10, 5])
-    assert error == pytest.approx((0.1 + 0.2) / 2)
-
-
 def test_group_timing_error_is_zero_for_true_warps_to_any_clock(bending):
     own = [np.arange(len(phi)) * 99 / (len(phi) - 1) for phi in bending.times]
     for power in (1.0, 1.7):

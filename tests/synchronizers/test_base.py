@@ -82,13 +82,6 @@ def test_transform_refuses_wrong_answers_of_match(answer, message, shifted):
         Wrong(30).fit_transform(shifted)
 
 
-def test_subclass_has_pandas_output(shifted):
-    frames = [pd.DataFrame(x, columns=["a", "b", "c"]) for x in shifted]
-    out = ShiftSynchronizer(30).set_output(transform="pandas").fit_transform(frames)
-    assert out.shape == (150, 3)
-    assert out.index.names == ["performance", "frame"]
-
-
 def test_match_must_be_defined(shifted):
     class Silent(Synchronizer):
         pass

@@ -16,7 +16,8 @@ from sklearn_motionsync import (
     to_sequences,
 )
 
-from made_bodies import with_still_root
+import made_bodies
+from made_bodies import turned, with_still_root
 
 PAPER = Skeleton.paper()
 FORMATS = ("paper", "acclaim", "kinect", "kinect_v2", "mediapipe", "plug_in_gait", "unreal")
@@ -31,12 +32,6 @@ def pipe(bending):
 def even(*lengths, n_frames=50):
     """A match at the uniform pace of the pattern."""
     return Match(np.tile(np.arange(float(n_frames)), (len(lengths), 1)))
-
-
-def turned(x, degrees):
-    a = np.deg2rad(degrees)
-    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
-    return (x.reshape(-1, 3) @ turn.T).reshape(x.shape)
 
 
 def lengths_of(x, skeleton, names=("thigh", "leg", "arm", "forearm")):
@@ -66,13 +61,9 @@ def walker(n_frames, size=1.0, seed=0):
 
 
 def standing(n_frames):
-    at = {"pelvis": (0, 1, 0), "neck": (0, 1.5, 0), "head": (0, 1.7, 0)}
-    for side, x in (("left", 1), ("right", -1)):
-        for y, joint in ((1.5, "shoulder"), (1.2, "elbow"), (0.9, "wrist")):
-            at[f"{side}_{joint}"] = (0.2 * x, y, 0.1 * (y < 1))
-        for y, joint in ((1, "hip"), (0.5, "knee"), (0, "ankle")):
-            at[f"{side}_{joint}"] = (0.1 * x, y, 0.1 * (y == 0.5))
-    return np.repeat([np.ravel([at[j] for j in PAPER.joints])], n_frames, axis=0).astype(float)
+    bent = {f"{side}_wrist": (x, 0.9, 0.1) for side, x in (("left", 0.2), ("right", -0.2))}
+    bent |= {f"{side}_knee": (x, 0.5, 0.1) for side, x in (("left", 0.1), ("right", -0.1))}
+    return np.repeat(made_bodies.standing(**bent), n_frames, axis=0)
 
 
 # -- a weight of one ---------------------------------------------------------------------------

@@ -7,7 +7,6 @@ import pytest
 from sklearn_motionsync import (
     DenseSynchronizer,
     LinearSynchronizer,
-    PartSynchronizer,
 )
 from sklearn_motionsync.inputs.collections import Performances
 from sklearn_motionsync.synchronizers import learning
@@ -143,33 +142,6 @@ def test_constant_signals_count_for_nothing(dtype):
 
 
 # -- a fit that fails -----------------------------------------------------------------------
-
-SYNCHRONIZERS = [
-    DenseSynchronizer(),
-    LinearSynchronizer(),
-    PartSynchronizer({"first": [0]}, synchronizer=DenseSynchronizer()),
-]
-
-
-@pytest.mark.parametrize("sync", SYNCHRONIZERS, ids=lambda sync: type(sync).__name__)
-def test_fit_that_fails_leaves_the_earlier_one_usable(sync):
-    X = trials(5)
-    expected = sync.fit(X).transform(X)
-    match = sync.match(X)
-    for wrong in ([X[0], X[1] * np.nan], [], [X[0], X[1][:, :1]]):
-        with pytest.raises(ValueError, match=r"(?i)performance"):
-            sync.fit(wrong)
-        np.testing.assert_array_equal(sync.transform(X), expected)
-        np.testing.assert_array_equal(sync.match(X).times, match.times)
-    name = "pattern" if "pattern" in sync.get_params() else "synchronizer__pattern"
-    with pytest.raises(ValueError, match="pattern=9 is out of range"):
-        sync.set_params(**{name: 9}).fit(X)
-    np.testing.assert_array_equal(sync.set_params(**{name: "median"}).transform(X), expected)
-    # Another fit takes the place of the first.
-    sync.fit([np.hstack([x, x]) for x in X])
-    assert sync.n_features_in_ == 4
-    with pytest.raises(ValueError, match="features"):
-        sync.transform(X)
 
 
 def test_fit_that_is_interrupted_leaves_the_earlier_one_usable(monkeypatch):

@@ -3,14 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn import config_context
-from sklearn.model_selection import cross_validate
-from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
     DenseSynchronizer,
-    DirectionCosines,
     LinearSynchronizer,
 )
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error
@@ -98,51 +92,13 @@ def test_timing_errors_with_keyframes_and_without(bending, bending_aspace):
     assert errors["linear"] > 2
 
 
-# -- metadata routing -------------------------------------------------------------------
-
-
-def make_pipe(bunch):
-    sync = LinearSynchronizer(60)
-    sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
-    return make_pipeline(DirectionCosines(bunch.skeleton), ASpace(4), sync, ActionModel())
-
-
-def test_keyframes_are_routed_in_a_pipeline(bending):
-    with config_context(enable_metadata_routing=True):
-        pipe = make_pipe(bending).fit(bending.data, keyframes=bending.keyframes)
-        points = pipe[:-2].transform(bending.data)
-        direct = LinearSynchronizer(60).fit_transform(points, keyframes=bending.keyframes)
-        np.testing.assert_array_equal(pipe[-1].mean_, ActionModel().fit(direct).mean_)
-        out = pipe[:-1].transform(bending.data, keyframes=bending.keyframes)
-        np.testing.assert_array_equal(out, direct)
-
-
-def test_keyframes_are_split_in_cross_validation(bending):
-    with config_context(enable_metadata_routing=True):
-        result = cross_validate(
-            make_pipe(bending)[:-1],
-            bending.data,
-            cv=3,
-            scoring=lambda estimator, X, y=None: len(estimator[-1].keyframes_),
-            params={"keyframes": list(bending.keyframes)},
-            error_score="raise",
-        )
-    assert result["test_score"].tolist() == [5, 5, 5]
-
-
 # -- bad key-frames -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("keyframes", "message"),
     [
-        ([[2, 5]], r"list of 2 arrays .*; got \[\[2, 5\]\]"),
         (3, "list of 2 arrays .*; got 3"),
-        (
-            [[2, 5], [5, 2]],
-            r"Performance 1: key-frames must be 2 increasing frames between 0 and 9",
-        ),
-        ([[2, 5], [2, 5, 7]], "Performance 1: key-frames must be 2"),
         ([[2, 5], [2, 9]], "Performance 1: .* both excluded"),
         ([[0, 5], [2, 5]], "Performance 0: "),
         ([[2, 5], 3], "Performance 1: "),

@@ -1,26 +1,19 @@
 """PartSynchronizer: recovered lags, coupling, composition, parts, and reports of lags."""
 
-import pickle
-
 import numpy as np
 import pandas as pd
 import pytest
-import skops.io as skops
 from scipy.stats import f_oneway, ttest_1samp
 from sklearn import clone
-from sklearn.model_selection import GridSearchCV
 from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     Lags,
-    Match,
     PartSynchronizer,
     Skeleton,
     SynchronizationWarning,
-    to_frame,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
-from sklearn_motionsync.metrics import SpreadScorer
 
 PARTS = ["left arm", "right arm", "left leg", "right leg", "trunk"]
 ARMS = {name: Skeleton.paper().parts()[name] for name in ("right arm", "left arm")}
@@ -102,7 +95,7 @@ def test_lag_of_an_arm_is_recovered_with_the_pattern_of_other_subjects(grabs):
 
 def test_warps_of_parts_come_nearer_with_the_coupling(grabs):
     X, apart = grabs[0][::4], []
-    for coupling in (0, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1, 1e6, np.inf):
+    for coupling in (0, 1e-4, 1e-2, 1, 1e6, np.inf):
         sync = of_parts(ARMS, coupling, n_frames=50).fit(X)
         body, parts = sync.match(X).times, sync.match_parts(X)
         apart.append([np.abs(parts[name].times - body).mean() for name in ARMS])
@@ -146,7 +139,7 @@ def test_strong_coupling_follows_warps_steeper_than_a_path(real_data):
 # -- warps of parts ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("settings", [{}, {"consensus": 0}, {"cost": "elastic"}])
+@pytest.mark.parametrize("settings", [{}, {"consensus": 0}])
 def test_match_is_that_of_the_dense_synchronizer(postures, settings):
     sync = of_parts(n_frames=40, **settings).fit(postures)
     dense = DenseSynchronizer(40, **settings).fit(postures)
@@ -164,19 +157,6 @@ def test_parts_of_noise_are_learnt():
     assert sync.match_parts(noise).keys() == {"one", "two"}
     assert sync.transform(noise).shape == (12, 60, 3)
     assert np.isfinite(sync.lags(noise).values).all()
-
-
-def test_settings_are_searched_and_the_fitted_state_is_stored(postures):
-    params = {"synchronizer__smoothness": [0.003, 0.1], "coupling": [0, 0.01]}
-    search = GridSearchCV(of_parts(n_frames=20, metric=None, consensus=1), params, cv=2)
-    search.set_params(scoring=SpreadScorer()).fit(postures)
-    fitted = search.best_estimator_
-    stored = skops.dumps(fitted)
-    copy = skops.loads(stored, trusted=skops.get_untrusted_types(data=stored))
-    np.testing.assert_array_equal(copy.transform(postures), fitted.transform(postures))
-    np.testing.assert_array_equal(copy.lags(postures).values, fitted.lags(postures).values)
-    times = Match.from_estimator(search, postures).times
-    np.testing.assert_array_equal(times, fitted.synchronizer_.match(postures).times)
 
 
 def test_infinite_coupling_gives_one_warp_for_all_parts(postures):
@@ -285,14 +265,6 @@ def test_other_features_have_no_parts():
         sync.lags(X)
 
 
-def test_joint_names_are_not_parts():
-    bunch = make_bending(4, n_frames=30, random_state=0)
-    names = bunch.skeleton.column_names
-    tables = [pd.DataFrame(x.reshape(len(x), -1), columns=names) for x in bunch.data]
-    assert "neck_x" in tables[0]
-    assert of_parts(n_frames=30).fit(tables).parts_ == {}
-
-
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
@@ -312,21 +284,6 @@ def test_joint_names_are_not_parts():
 def test_fit_refuses_invalid_parts(postures, parts, message):
     with pytest.raises(ValueError, match=message):
         PartSynchronizer(parts).fit(postures)
-
-
-def test_tables_in_and_out(postures):
-    names = [f"f{i}" for i in range(37)]
-    parts = {"arm": ["f25", "f26"], "foot": 36}
-    X = [x.astype(np.float32) for x in postures]
-    sync = of_parts(parts, n_frames=30).set_output(transform="pandas")
-    out = sync.fit_transform(to_frame(X, columns=names, performances=list("abcdefg")))
-    assert out.loc["c"].shape == (30, 37)
-    assert set(out.dtypes) == {np.dtype(np.float32)}
-    copy = pickle.loads(pickle.dumps(sync))
-    tables = [pd.DataFrame(x, columns=names) for x in X]
-    np.testing.assert_array_equal(copy.transform(tables).to_numpy(), out.to_numpy())
-    lags = sync.lags(to_frame(X, columns=names, performances=list("abcdefg")))
-    assert lags.to_frame().loc["g"].columns.tolist() == ["arm", "foot"]
 
 
 # -- reports of lags ---------------------------------------------------------------------
@@ -352,7 +309,7 @@ def test_lags_in_every_unit(fitted):
 def test_reference_is_a_least_absolute_fit(fitted, postures, real_data):
     """Of equally good ones the farthest from the mean; features of no part vote, too."""
     bends, _ = clips_of(real_data, "depositFloorR")
-    for X, new in ((postures, made_postures(4, 3)), (bends[:12], bends[12:18])):
+    for X, new in ((postures, made_postures(4, 3)), (bends[:9], bends[12:15])):
         left = np.setdiff1d(np.arange(37), np.concatenate([*fitted.parts_.values()]))
         sync = of_parts({**fitted.parts_, "left": left}, 0, n_frames=60).fit(X)
         own, taught = offsets_from_mean(sync, X, new), offsets_from_mean(sync, X, X)
@@ -382,11 +339,8 @@ def shifted(x, columns, share):
 @pytest.mark.parametrize(
     ("action", "late"),
     [
-        ("depositFloorR", ["left arm"]),
         ("depositFloorR", ["left arm", "right leg"]),
         ("elbowToKnee1RepsLelbowStart", ["right leg"]),
-        ("elbowToKnee1RepsLelbowStart", ["right arm", "left arm"]),
-        ("grabHighR", ["right arm"]),
     ],
 )
 def test_shifted_parts_of_new_people_leave_the_others(real_data, action, late):
@@ -457,15 +411,3 @@ def test_spread_is_nan_for_too_few_performances(fitted, postures):
     one = fitted.lags(postures[:1]).summary()
     assert one["mean"].notna().all()
     assert one[["sd", "low", "high"]].isna().all(axis=None)
-
-
-@pytest.mark.parametrize(
-    ("params", "message"),
-    [
-        ({"unit": "hours"}, "unit must be one of"),
-        ({"unit": "seconds"}, "needs X.* and frame_rate"),
-    ],
-)
-def test_lags_refuse_invalid_arguments(fitted, postures, params, message):
-    with pytest.raises(ValueError, match=message):
-        fitted.lags(postures, **params)

@@ -47,7 +47,7 @@ def test_copies_of_one_source_are_refined(n_features, noise, known_warps):
 
 @pytest.mark.parametrize(("noise", "most"), [(0.005, 0.03), (0.05, 0.12), (0.2, 0.35)])
 def test_refined_warps_have_small_errors(noise, most, known_warps):
-    cases = [known_warps(seed, noise) for seed in range(3)]
+    cases = [known_warps(seed, noise) for seed in range(2)]
     assert np.mean([error(X, truth) for X, truth in cases]) < most
 
 
@@ -162,15 +162,13 @@ def test_people_are_not_refined(action, real_data):
     bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
     chosen = np.flatnonzero(bunch.target == action)
     postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
-    for actor in (None, "bd", "bk", "dg", "tr"):
+    for actor in (None, "bd", "tr"):
         mine = [x for x, i in zip(postures, chosen, strict=True) if actor in (None, bunch.actor[i])]
         counts = (None, 2, 1) if actor is None else (None, 2)
         assert_not_refined_whatever_the_features(mine, counts)
 
 
-@pytest.mark.parametrize(
-    ("archive", "action"), [("utkinect", "pull"), ("utkinect", "waveHands"), ("cmu07_walk", None)]
-)
+@pytest.mark.parametrize(("archive", "action"), [("utkinect", "pull"), ("cmu07_walk", None)])
 def test_people_of_other_data_sets_are_not_refined(archive, action, real_data):
     """One subject walks, each time anew."""
     bunch = load_performances(real_data / archive / f"{archive}_positions.npz")

@@ -4,11 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn import config_context
-from sklearn.base import clone
 from sklearn.decomposition import PCA
 from sklearn.exceptions import NotFittedError
-from sklearn.linear_model import Ridge
-from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionDetector,
@@ -232,7 +230,6 @@ def test_errors_of_rows_follow_their_channel():
     channel = TimingChannel(DenseSynchronizer(20), errors=True).set_output(transform="pandas")
     out = channel.fit_transform(rows)
     assert out.shape == (5, 60)
-    assert list(out.columns) == channel.get_feature_names_out().tolist()
     assert list(out.columns[[20, 39, 40, 59]]) == [
         "offset0",
         "offset19",
@@ -241,27 +238,6 @@ def test_errors_of_rows_follow_their_channel():
     ]
     lower, upper = channel.match(rows).interval(0.6827, "percent")
     np.testing.assert_allclose(out.iloc[:, 40:], (upper - lower) / 2)
-    assert make_pipeline(channel, PCA(2)).fit_transform(rows).shape == (5, 2)
-    pipe = make_pipeline(clone(channel), Ridge())
-    rows = np.concatenate([rows, rows[::-1] + 0.01])
-    assert np.isfinite(cross_val_score(pipe, rows, np.arange(10), cv=2)).all()
-
-
-def test_errors_pass_through_pipelines_and_tables(bunch):
-    X = bunch.data
-    pipe = steps(bunch, TimingChannel(DenseSynchronizer(30), errors=True), ActionModel())
-    pipe = clone(pipe).set_output(transform="pandas").fit(X)
-    table = pipe[:-1].transform(X)
-    names = ["aspace0", "aspace1", "aspace2", "offset", "offset_error"]
-    assert list(table.columns) == names
-    assert table.index.nlevels == 2
-    np.testing.assert_allclose(
-        table["offset_error"].to_numpy().reshape(7, 30),
-        np.diff(Match.from_estimator(pipe, X).interval(0.6827, "percent"), axis=0)[0] / 2,
-    )
-    display = ActionModelDisplay.from_estimator(pipe, X, features=["offset_error", "pelvis_height"])
-    assert display.ylabels == ["offset_error", "pelvis_height"]
-    assert np.isfinite(cross_val_score(pipe, X, cv=2)).all()
 
 
 def test_errors_are_zero_where_a_warp_is_pinned(points):
@@ -295,17 +271,10 @@ def test_errors_of_parts_are_those_of_the_whole_body(points):
     np.testing.assert_array_equal(found, expected)
 
 
-def test_fit_refuses_a_feature_with_the_name_of_the_errors(points):
-    frames = [pd.DataFrame(x, columns=["p", "offset_error", "r"]) for x in points]
-    with pytest.raises(ValueError, match="has the name of the errors, 'offset_error': rename it"):
-        TimingChannel(DenseSynchronizer(30), errors=True).fit(frames)
-    assert TimingChannel(DenseSynchronizer(30)).fit(frames).n_frames_ == 30
-
-
-def group_of_trials(seed, spread):
+def group_of_trials(seed):
     """A template, 12 trials later than it, a third of them under much noise, and true offsets.
 
-    Trials are 5 % late in the middle, and differ by ``spread`` %.
+    Trials are 5 % late in the middle.
     """
     rng, dense = np.random.default_rng(seed), np.linspace(0, 1, 2001)
 
@@ -318,18 +287,17 @@ def group_of_trials(seed, spread):
 
     clock, trials = np.linspace(0, 1, 101), []
     for noise in np.repeat([0.02, 0.05, 0.4], 4):
-        late = 0.05 + spread / 100 * rng.standard_normal()
-        x = curves(moment(np.linspace(0, 1, rng.integers(90, 120)), late))
+        x = curves(moment(np.linspace(0, 1, rng.integers(90, 120)), 0.05))
         trials.append(x + noise * rng.standard_normal(x.shape))
     return curves(clock), trials, 100 * (np.interp(clock, moment(dense, 0.05), dense) - clock)
 
 
-def mean_errors(seed, spread, floor):
+def mean_errors(seed):
     """How far the plain and the weighted mean offset of a group are from the truth, in per cent."""
-    pattern, trials, truth = group_of_trials(seed, spread)
+    pattern, trials, truth = group_of_trials(seed)
     channel = TimingChannel(DenseSynchronizer(101, pattern=pattern), errors=True)
     offsets, errors = np.moveaxis(channel.fit_transform(trials)[:, :, -2:], 2, 0)
-    weights = 1 / (errors**2 + floor**2)
+    weights = 1 / (errors**2 + 0.1**2)
     means = [offsets.mean(axis=0), np.average(offsets, axis=0, weights=weights)]
     return np.sqrt([np.square(mean - truth).mean() for mean in means])
 
@@ -337,13 +305,6 @@ def mean_errors(seed, spread, floor):
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 def test_weighted_means_are_closer_to_the_truth_if_trials_differ_in_noise():
     """Trials of the same timing: the error of the mean is due to noise alone."""
-    plain, weighted = np.transpose([mean_errors(seed, 0, 0.1) for seed in range(6)])
+    plain, weighted = np.transpose([mean_errors(seed) for seed in range(3)])
     assert (weighted < plain).all()
     assert weighted.mean() < 0.5 * plain.mean()
-
-
-@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
-def test_weights_with_the_spread_of_trials_do_no_harm_where_that_is_large():
-    """Trials of different timing: the spread is added to the errors, and the means are as good."""
-    plain, weighted = np.transpose([mean_errors(seed, 3, 3) for seed in range(6)])
-    assert weighted.mean() < 1.2 * plain.mean()

@@ -16,7 +16,6 @@ from sklearn.preprocessing import (
     OneHotEncoder,
     StandardScaler,
 )
-from sklearn.utils import estimator_checks
 from sklearn.utils.estimator_checks import parametrize_with_checks
 from sklearn_motionsync import (
     ActionModel,
@@ -31,29 +30,13 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.display import SkeletonDisplay
 
-from estimators import by_name
-from test_contract import EXTRA_CHECKS
-
-CHECKED = [
-    FrameWise(transformer)
-    for transformer in (
-        PCA(),
-        make_pipeline(SimpleImputer(), StandardScaler()),
-    )
-]
+CHECKED = [FrameWise(make_pipeline(SimpleImputer(), StandardScaler()))]
 
 
 @parametrize_with_checks(CHECKED)
 def test_scikit_learn_checks(estimator, check):
+    """Of a transformer that takes gaps; one that takes none is in the contract."""
     check(estimator)
-
-
-@pytest.mark.filterwarnings("ignore:X does not have valid feature names:UserWarning")
-@pytest.mark.filterwarnings("ignore:X has feature names, but:UserWarning")
-@pytest.mark.parametrize("estimator", CHECKED, ids=by_name)
-@pytest.mark.parametrize("name", EXTRA_CHECKS)
-def test_scikit_learn_checks_that_are_not_in_the_automatic_list(estimator, name):
-    getattr(estimator_checks, name)("FrameWise", clone(estimator))
 
 
 @pytest.fixture
@@ -210,17 +193,16 @@ def test_fit_refuses_transformers(transformer, words, X):
 
 
 def test_departures_and_figures_show_postures_before_scaling(bending):
-    cosines = DirectionCosines(bending.skeleton)
-    steps = ASpace(), DenseSynchronizer(60), ActionModel()
-    plain = make_pipeline(cosines, *steps).fit(bending.data)
+    cosines, data = DirectionCosines(bending.skeleton), bending.data[:8]
+    steps = ASpace(), DenseSynchronizer(30), ActionModel()
+    plain = make_pipeline(cosines, *steps).fit(data)
     scaled = make_pipeline(cosines, FrameWise(StandardScaler()), *map(clone, steps))
-    pipes = plain, scaled.fit(bending.data)
-    found = [set(find_departures(pipe, bending.data, limit=1)["feature"]) for pipe in pipes]
+    pipes = plain, scaled.fit(data)
+    found = [set(find_departures(pipe, data, limit=1)["feature"]) for pipe in pipes]
     assert found[1] <= set(plain[0].get_feature_names_out())
     assert found[0] & found[1]
     displays = [
-        SkeletonDisplay.from_departures(pipe, bending.data, performance=1, frames=[0, 59])
-        for pipe in pipes
+        SkeletonDisplay.from_departures(pipe, data, performance=1, frames=[0, 29]) for pipe in pipes
     ]
     bodies = [np.concatenate([x for scene in d.scenes for x in scene]) for d in displays]
     np.testing.assert_allclose(*bodies, atol=0.15)
