@@ -1,10 +1,10 @@
 """Pages as a reader takes them: block after block pasted into an interpreter."""
 
+import code
+import contextlib
 import doctest
-import os
+import io
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -22,57 +22,34 @@ BLOCK = re.compile(
     r"(?:\n```text\n(.*?)^```\n)?",
     re.MULTILINE | re.DOTALL,
 )
-BLOCKS = {name: [match.groups() for match in BLOCK.finditer(page)] for name, page in PAGES.items()}
-NUMBERED = [(name, number) for name, blocks in BLOCKS.items() for number in range(len(blocks))]
-MARK = "the end of block"
 FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 
 
-@pytest.fixture(scope="module")
-def sessions(tmp_path_factory):
-    """What a fresh interpreter prints for each block of a page, and its complaints."""
-    folder = tmp_path_factory.mktemp("pages")
-    return {name: paste(blocks, folder) for name, blocks in BLOCKS.items()}
-
-
-def paste(blocks, folder):
-    pasted = "".join(f"{code}\nprint({MARK!r})\n" for code, _ in blocks)
-    done = subprocess.run(
-        [sys.executable, "-i", "-q", "-W", "error"],
-        input=pasted,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        cwd=folder,
-        env=os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)},
-        check=False,
-    )
-    return done.stdout.split(MARK + "\n"), done.stderr
+def paste(lines, console):
+    """What an interpreter prints for the lines of a block; an error of a block fails the test."""
+    printed, complaints = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(complaints):
+        for line in [*lines.split("\n"), ""]:
+            console.push(line)
+    assert complaints.getvalue() == ""
+    return printed.getvalue()
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_every_block_of_the_tutorial_is_parsed(name):
-    page, blocks = PAGES[name], BLOCKS[name]
+def test_blocks_of_a_page_run_in_order_and_print_what_it_says(name, tmp_path, monkeypatch):
+    page, blocks = PAGES[name], BLOCK.findall(PAGES[name])
     assert len(blocks) == page.count("```{plot}") + page.count("```python")
-    assert sum(printed is not None for _, printed in blocks) == page.count("```text")
-    assert all(("print(" in code) == (printed is not None) for code, printed in blocks)
+    assert sum(bool(expected) for _, expected in blocks) == page.count("```text")
     assert ">>>" not in page
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_tutorial_blocks_run_in_order(sessions, name):
-    outputs, complaints = sessions[name]
-    assert re.sub(r">>> |\.\.\. |\n", "", complaints) == ""
-    assert len(outputs) == len(BLOCKS[name]) + 1
-
-
-@pytest.mark.parametrize(("name", "number"), NUMBERED)
-def test_tutorial_block_prints_the_documented_output(sessions, name, number):
-    printed, expected = sessions[name][0][number], BLOCKS[name][number][1]
-    if expected is None:  # what is left is the figure, by its short name
-        assert re.fullmatch(r"(\w+Display\(.*\)\n)?", printed), printed
-    else:
-        assert doctest.OutputChecker().check_output(expected, printed, FLAGS), printed
+    monkeypatch.chdir(tmp_path)
+    console = code.InteractiveConsole({"__name__": "__main__"})
+    for lines, expected in blocks:
+        assert ("print(" in lines) == bool(expected), lines
+        printed = paste(lines, console)
+        if expected:
+            assert doctest.OutputChecker().check_output(expected, printed, FLAGS), printed
+        else:  # what is left is the figure, by its short name
+            assert re.fullmatch(r"(\w+Display\(.*\)\n)?", printed), printed
 
 
 # -- every other page ---------------------------------------------------------------------
