@@ -1,6 +1,7 @@
 """The architecture: subpackages and their imports, names, and what is public."""
 
 import ast
+import functools
 import graphlib
 import re
 from pathlib import Path
@@ -35,6 +36,8 @@ ALLOWED = {
 }
 
 
+# All tests read the same files.
+@functools.cache
 def read(path):
     return ast.parse(path.read_text(encoding="utf-8"))
 
@@ -48,6 +51,7 @@ def name_of(path):
 MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
+@functools.cache
 def imports(name):
     """Modules of the package, and names of scikit-learn, that a module imports."""
     inside, outside = set(), set()

@@ -16,7 +16,6 @@ from sklearn_motionsync import (
     CycleSegmenter,
     DirectionCosines,
     FrameWise,
-    JointPositions,
     LinearSynchronizer,
     Match,
     blend_performances,
@@ -43,16 +42,6 @@ def gaps(bunch):
 def filled(X, skeleton):
     columns = skeleton.column_names
     return [fill_gaps(pd.DataFrame(x, columns=columns), max_gap=10).to_numpy() for x in X]
-
-
-@pytest.mark.parametrize("kind", [DirectionCosines, JointPositions])
-def test_bodies_name_the_parameter_that_takes_gaps(kind, bunch, gaps):
-    message = r"Performance 1, frame 10, feature \d+ is NaN.*Set hidden='nan'"
-    with pytest.raises(ValueError, match=message):
-        kind(bunch.skeleton).fit(gaps)
-    kind(bunch.skeleton).fit(filled(gaps, bunch.skeleton))
-    postures = kind(bunch.skeleton, hidden="nan").fit_transform(gaps)
-    assert [bool(np.isnan(x).any()) for x in postures] == [i % 3 == 1 for i in range(12)]
 
 
 def test_a_classifier_names_the_step_that_takes_gaps(bunch, gaps):
