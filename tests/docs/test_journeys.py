@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from sklearn_motionsync import Match
 from sklearn_motionsync.datasets import make_bending, make_walk
+from sklearn_motionsync.display import SkeletonDisplay
 
 from motion_files import c3d, texts, trc
 
@@ -274,6 +275,8 @@ def test_files_of_motion_capture(title, ending, name, bodies, tmp_path, monkeypa
         check_picture(f"{name}.png")
         assert len(plt.gcf().axes) == 2
     if ending == "bvh":
+        animate = SkeletonDisplay.animate
+        monkeypatch.setattr(SkeletonDisplay, "animate", lambda self: animate(self, seconds=0.2))
         exec(SECTIONS[title][1], left)
         columns = list(left[name][0])
         positions = pd.read_csv("positions.csv", index_col=[0, 1])
