@@ -335,13 +335,9 @@ def conditions(fold, seed=0):
 
 
 def _with_gap(x, rng):
-    begin = round(rng.uniform(0.2, 0.6) * len(x))
-    return np.where(_between(len(x), begin, begin + max(1, round(len(x) / 5))), np.nan, x)
-
-
-def _between(n, begin, end):
-    frames = np.arange(n)[:, np.newaxis]
-    return (frames >= begin) & (frames < end)
+    begin, hidden = round(rng.uniform(0.2, 0.6) * len(x)), x.copy()
+    hidden[begin : begin + max(1, round(len(x) / 5))] = np.nan
+    return hidden
 
 
 def inside(lower, upper, truth):
