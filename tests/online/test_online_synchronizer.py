@@ -118,7 +118,7 @@ def test_track_equals_step_and_does_not_look_ahead(fitted, live):
     x[0, 1] = x[7:9, 2] = np.nan
     whole, part = fitted.track([x, x[:40]])
     steps = step_all(live, x)
-    names = ("phase", "rate", "confidence", "lower", "upper")
+    names = ("phase", "rate", "confidence", "lower", "upper", "cycle")
     for values, name in zip(whole, names, strict=True):
         np.testing.assert_array_equal(values, [getattr(step, name) for step in steps])
         np.testing.assert_array_equal(values[:40], getattr(part, name))
