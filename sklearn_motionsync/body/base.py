@@ -19,12 +19,11 @@ from ..inputs.validation import (
     names_of_input,
     restore,
 )
-from ..inputs.wording import counted
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .axes import fill_heading, heading_axes, to_y_up
-from .formats import AXES, LANDMARKS, SIDES
+from .formats import LANDMARKS, SIDES
 from .limbs import (
     LATERAL_LIMBS,
     LIMB_NAMES,
@@ -349,17 +348,10 @@ class PositionsTransformer(
         finite = self._finite
         performances = check_performances(self, X, reset=reset, level="posture", finite=finite)
         skeleton = self.skeleton
-        width, expected = performances[0].shape[1], skeleton.n_dims * len(skeleton.joints)
-        if width != expected:
-            raise ValueError(
-                f"Performance 0 has {counted(width, 'feature')} a frame, but the skeleton's "
-                f"{len(skeleton.joints)} joints need {expected}: "
-                f"{', '.join(AXES[skeleton.n_dims])} of each."
-            )
         # Tables have their columns in the order of fit; if it had none, in that of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
         names = names_of_input(self) or column_names(first)
-        check_columns(names or (), skeleton, "Performance 0")
+        check_columns(names or (), skeleton, "Performance 0", performances[0].shape[1])
         for i, facts in enumerate(performances.facts):
             up = facts.get("up", skeleton.up)
             if up != skeleton.up:

@@ -439,7 +439,7 @@ def parse_joint_columns(df):
     )
 
 
-def check_columns(names, skeleton, what):
+def check_columns(names, skeleton, what, width=None):
     """Refuse columns of which one of the skeleton has the place of another one.
 
     Columns with other names are accepted.
@@ -450,8 +450,16 @@ def check_columns(names, skeleton, what):
     skeleton : Skeleton
     what : str
         The subject of the message, with a capital letter.
+    width : int, default=None
+        The number of columns, if it is to be checked, too.
     """
     expected = skeleton.column_names
+    if width not in (None, len(expected)):
+        raise ValueError(
+            f"{what} has {counted(width, 'feature')} a frame, but the skeleton's "
+            f"{len(skeleton.joints)} joints need {len(expected)}: "
+            f"{', '.join(AXES[skeleton.n_dims])} of each."
+        )
     place_of = {name: place for place, name in enumerate(expected)}
     for place, name in enumerate(names):
         if place_of.get(name, place) != place:

@@ -70,14 +70,8 @@ class Recordings:
                 )
             skeleton = Skeleton.from_frame(first)
         self.skeleton, self._feet = skeleton, joints_of_feet(skeleton, feet)
-        width, expected = self._checked[0].shape[1], skeleton.n_dims * len(skeleton.joints)
-        if width != expected:
-            raise ValueError(
-                f"{self.called(0)} has {counted(width, 'feature')} a frame, but the skeleton's "
-                f"{len(skeleton.joints)} joints need {expected}."
-            )
-        if isinstance(first, pd.DataFrame):
-            check_columns(list(first.columns), skeleton, self.called(0))
+        names = list(first.columns) if isinstance(first, pd.DataFrame) else []
+        check_columns(names, skeleton, self.called(0), self._checked[0].shape[1])
         self._labels, levels = labels_of(self._given)
         self.levels = list(levels[:-1])
         self._rates = self._find_rates(frame_rate)

@@ -135,7 +135,7 @@ def find_performances(
         Frames a second of the training performances, or of an array. By default what tables told
         the synchronizer in ``fit``.
     verbose : int, default=0
-        Above 0 prints the progress.
+        Above 0 prints the progress, take by take.
 
     Returns
     -------
@@ -212,18 +212,18 @@ def _search_takes(takes, propose, dissimilarity, threshold, coverage, progress):
     fixed = None if threshold is None or threshold == "auto" else max(threshold, _NO_SCORE)
     limit = dissimilarity.threshold(coverage) if fixed is None else -np.log(fixed)
     hopeless = float(np.exp(-_HOPELESS * limit))
-    sizes, out = [propose.n_portions(len(take)) for take in takes], []
-    step = progress.stage("searching", 2 * sum(sizes))
-    for take, size in zip(takes, sizes, strict=True):
+    step, out = progress.stage("searching", len(takes)), []
+    for take in takes:
         take = take.astype(np.float64, copy=False)
         search = WindowSearch(take, dissimilarity, propose.shortest, propose.longest)
         lowest = 0.0 if threshold is None else hopeless
-        hits = search.hits(propose(take, step), lowest, step, size)
+        hits = search.hits(propose(take), lowest)
         level = threshold
         if fixed is None:
             u = -np.log([hit.score for hit in hits if hit.proposed >= hopeless])
             level = float(np.exp(-dissimilarity.threshold_of_take(limit, u, len(take))))
         out.append((hits, level))
+        step()
     return out
 
 
@@ -391,7 +391,7 @@ class WindowSearch:
         self._take, self._dissimilarity = take, dissimilarity
         self._shortest, self._longest = shortest, longest
 
-    def hits(self, windows, lowest, step=None, n_steps=0):
+    def hits(self, windows, lowest):
         """A `Hit` of each of windows (n, 2) that overlaps no better one, in order of time.
 
         Windows whose score is below ``lowest`` are not refined. One that is refined excludes those
@@ -400,17 +400,12 @@ class WindowSearch:
         scores = np.exp(-self._dissimilarity(self._take, windows))
         order = _best_first(scores)
         order = order[scores[order] >= lowest]
-        due = np.diff(np.linspace(0, n_steps, max(len(order), 1) + 1).astype(int))
         refined = []
-        for i, k in enumerate(order):
+        for k in order:
             limits = self._limits(windows[k], refined)
             if limits is not None:
                 first, last = limits
                 insort(refined, self._refine(windows[k], scores[k], first, last))
-            for _ in range(due[i]):
-                step()
-        for _ in range(0 if len(order) else n_steps):
-            step()
         return refined
 
     def _limits(self, window, refined):
@@ -564,30 +559,21 @@ class Proposer(NamedTuple):
         features = features.replace(velocity_smoothing=share * features.velocity_smoothing)
         return cls(features, base, trellis, scales(shortest, longest), shortest, longest)
 
-    def __call__(self, take, step=None):
+    def __call__(self, take):
         """Distinct windows of a take (n_frames, n_features): (n_windows, 2) of start and stop."""
         lengths = self.lengths[self.lengths <= len(take)]
-        windows_of_scales = [self._at_scale(take, int(length), step) for length in lengths]
+        windows_of_scales = [self._at_scale(take, int(length)) for length in lengths]
         windows = np.concatenate([np.empty((0, 2), dtype=np.intp), *windows_of_scales])
         sizes = windows[:, 1] - windows[:, 0]
         fits = (self.shortest <= sizes) & (sizes <= self.longest)
         return np.unique(windows[fits], axis=0)
 
-    def n_portions(self, n_frames):
-        """How often a step is called in a take of so many frames."""
-        lengths = self.lengths[self.lengths <= n_frames].tolist()
-        return sum(-(-len(self._starts(n_frames, n)) // _PROPOSAL_BATCH) for n in lengths)
-
-    def _starts(self, n_frames, length):
-        """Where the portions of a take begin, for a pattern of about this number of frames."""
-        pace = (length - 1) / (self.base.shape[1] - 1)
-        count = whole((n_frames - length) / max(self.trellis.width * pace, 1.0), "up") + 1
-        return np.linspace(0, n_frames - length, count)
-
-    def _at_scale(self, take, length, step):
+    def _at_scale(self, take, length):
         """The best window of every portion, for a pattern of about this number of frames."""
         n_frames, width = self.base.shape[1], self.trellis.width
-        starts, pace = self._starts(len(take), length), (length - 1) / (n_frames - 1)
+        pace = (length - 1) / (n_frames - 1)
+        count = whole((len(take) - length) / max(width * pace, 1.0), "up") + 1
+        starts = np.linspace(0, len(take) - length, count)
         clock = np.arange(-width, n_frames + width) * pace
         windows = []
         for rows in even_slices(len(starts), _PROPOSAL_BATCH):
@@ -597,8 +583,6 @@ class Proposer(NamedTuple):
             first, last = starts[rows] + paths[:, 0] * pace, starts[rows] + length - 1
             window = np.stack([first, last + paths[:, -1] * pace + 1], axis=1)
             windows.append(np.clip(whole(window), 0, len(take)))
-            if step is not None:
-                step()
         return np.concatenate(windows)
 
 

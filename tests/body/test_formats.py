@@ -170,11 +170,3 @@ def test_landmarks_of_other_names_are_guessed(joints, landmarks):
 def test_joints_and_parents_are_those_of_real_recordings(real_data, archive, name):
     bunch = load_performances(real_data / f"{archive}_positions.npz")
     assert bunch.skeleton == ready(name)
-
-
-def test_landmarks_of_a_recording_without_format_are_guessed(real_data):
-    with np.load(real_data / "cmu07_walk" / "cmu07_walk_positions.npz") as archive:
-        skeleton = Skeleton(archive["joints"], archive["parents"])
-    assert skeleton.landmarks["left_hip"] == "CC_Base_L_Thigh"
-    assert skeleton.landmarks["right_elbow"] == "CC_Base_R_Forearm"
-    assert skeleton.landmarks["pelvis"] == "CC_Base_Hip"

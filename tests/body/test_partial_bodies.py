@@ -1,12 +1,9 @@
 """Bodies that lack landmarks, and landmarks that are means of joints."""
 
-from itertools import product
-
 import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
-from sklearn_motionsync.body.limbs import complete_legs
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.io import read_motion
 
@@ -291,16 +288,3 @@ def test_body_has_the_landmarks_that_limbs_join():
     given = Skeleton([*legs, "head"], [-1] * 7, {name: name for name in [*legs, "head"]})
     assert given.body().joints == tuple(legs)
     assert Skeleton(legs, [-1] * 6).body().joints == ("pelvis", *legs)
-
-
-@pytest.mark.parametrize("others", [[], ["trunk", "left_arm"]])
-def test_a_leg_is_complete_with_its_thigh_and_leg(others):
-    legs = [f"{side}_{part}" for side in ("left", "right") for part in ("thigh", "leg")]
-    for chosen in product([False, True], repeat=4):
-        there = [name for name, chosen in zip(legs, chosen, strict=True) if chosen]
-        expected = [
-            side
-            for side in ("left", "right")
-            if f"{side}_thigh" in there and f"{side}_leg" in there
-        ]
-        assert complete_legs([*others, *there]) == expected

@@ -104,14 +104,12 @@ def test_up_is_estimated_unless_given(up, joints, recording):
     assert Skeleton.from_frame(df).up == up
 
 
-@pytest.mark.parametrize("up", ["x", "-z"])
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
-def test_up_of_people_is_estimated(real_data, name, up):
+def test_up_of_people_is_estimated(real_data, name):
     bunch = load_performances(real_data / f"{name}_positions.npz")
-    # Each of them with three of the axes.
-    for x in bunch.data[list(UPS).index(up) % 2 :: 2]:
-        df = columns_of(raised(x.astype(float), up), bunch.skeleton)
-        assert Skeleton.from_frame(df).up == up
+    for x in bunch.data[::2]:
+        df = columns_of(raised(x.astype(float), "-z"), bunch.skeleton)
+        assert Skeleton.from_frame(df).up == "-z"
 
 
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
@@ -121,11 +119,12 @@ def test_up_of_upper_bodies_is_right_or_in_doubt(real_data, name):
     given = dict.fromkeys(PAPER.joints)
     given |= {at: bunch.skeleton.landmarks[at] for at in ("pelvis", "neck", "head", *arms)}
     right = 0
-    for x in bunch.data:
+    X = bunch.data[::3]
+    for x in X:
         assert Skeleton.from_frame(columns_of(x, bunch.skeleton), landmarks=given).up == "y"
         df = columns_of(raised(x, "-z"), bunch.skeleton)
         right += Skeleton.from_frame(df, landmarks=given).up == "-z"
-    assert right > 0.85 * len(bunch.data)
+    assert right > 0.85 * len(X)
 
 
 def test_up_is_y_in_doubt():
@@ -166,7 +165,7 @@ def test_parts_of_people_are_accepted_and_upside_down_refused(real_data, name):
         known = {j: bunch.skeleton.landmarks[j] for j in landmarks}
         some = Skeleton(bunch.joints, bunch.skeleton.parents, known)
         fitted = DirectionCosines(some).fit(bunch.data)
-        for x in bunch.data if all_tell else bunch.data[:1]:
+        for x in bunch.data[::3] if all_tell else bunch.data[:1]:
             with pytest.raises(ValueError, match="upside down"):
                 fitted.transform([turned_over(x)])
 

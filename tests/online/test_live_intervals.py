@@ -20,7 +20,7 @@ P = 100
 BUNCH = make_bending(48, n_actors=8, n_frames=P, random_state=4)
 COSINES = DirectionCosines(BUNCH.skeleton).fit(BUNCH.data)
 KNOWN = np.flatnonzero(np.isin(BUNCH.actor, np.unique(BUNCH.actor)[:5]))
-NEW = np.setdiff1d(np.arange(48), KNOWN)[1::2]
+NEW = np.setdiff1d(np.arange(48), KNOWN)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def live(fitted):
 
 @pytest.fixture(scope="module")
 def clips():
-    """Half of those of the other three actors."""
+    """Those of the other three actors."""
     return COSINES.transform([BUNCH.data[i] for i in NEW])
 
 
@@ -96,15 +96,16 @@ def with_hidden_limb(clips, rng):
 
 @pytest.mark.parametrize("change", [None, noisy, with_gaps, with_hidden_limb])
 def test_intervals_hold_the_made_truth_of_new_people(fitted, clips, truths, change):
-    as_made = fitted.track(clips)
+    """Of every second clip."""
+    as_made = fitted.track(clips[1::2])
     found = as_made
     if change is not None:
-        found = fitted.track(change(clips, np.random.default_rng(0)))
+        found = fitted.track(change(clips, np.random.default_rng(0))[1::2])
         assert mean_width(found) > 1.1 * mean_width(as_made)
     for one in found:
         check_bounds(one)
     # More than 95 % where noise lets the costs overestimate it.
-    assert 0.85 <= held(found, truths) <= 0.99
+    assert 0.85 <= held(found, truths[1::2]) <= 0.99
 
 
 def test_intervals_hold_the_phases_of_real_people_held_out(real_data):

@@ -123,7 +123,7 @@ def test_track_equals_step_and_does_not_look_ahead(fitted, live):
         np.testing.assert_array_equal(values, [getattr(step, name) for step in steps])
         np.testing.assert_array_equal(values[:40], getattr(part, name))
         np.testing.assert_array_equal(values, getattr(live.history, name))
-    assert all(isinstance(value, float) for value in steps[0])
+    assert all(isinstance(value, float) for value in steps[0][:5])
 
 
 def test_costs_at_the_end_equal_offline_trellis_to_the_last_bit():

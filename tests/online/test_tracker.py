@@ -105,13 +105,6 @@ def test_seconds_are_frames_over_the_frame_rate(tracker, take):
         np.testing.assert_allclose(a, b, atol=1e-6)
 
 
-def test_half_the_frames_give_nearly_the_same_phases(tracker):
-    clean, times = movement(1.05, 119), np.arange(119) / 2
-    every = tracker.track(clean, times=times).phases[::2]
-    second = tracker.track(clean[::2], times=times[::2]).phases
-    assert np.abs(every - second)[5:].max() < 3
-
-
 @pytest.mark.parametrize("kind", [list, np.stack, lambda X: [pd.DataFrame(x) for x in X]])
 def test_kinds_of_input_give_the_same(tracker, take, kind):
     first, second = tracker.track(kind([take, take]))
