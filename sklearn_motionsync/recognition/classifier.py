@@ -16,7 +16,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.types import Cost, Labels, PerformancesLike
+from ..inputs.types import Cost, Labels, PerformancesLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.costs import COSTS
 from ..matching.counting import first_largest
@@ -262,6 +262,27 @@ class ActionClassifier(
             threshold = self.threshold_at(_COVERAGE)
         codes[decisions.max(axis=1) < threshold] = len(self.classes_)
         return add_unknown_label(self.classes_, self.unknown_label)[codes]
+
+    def score(
+        self, X: PerformancesLike, y: Labels, sample_weight: ValuesLike | None = None
+    ) -> float:
+        """Share of performances that are given their class.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : array-like, shape (n_sequences,)
+            Their classes.
+        sample_weight : array-like, shape (n_sequences,), default=None
+            The weight of each performance; by default all are equal.
+
+        Returns
+        -------
+        float
+            From 0 to 1. One that ``reject_below`` rejects is a mistake.
+        """
+        return float(super().score(X, y, sample_weight))
 
     def predict_proba(self, X: PerformancesLike) -> np.ndarray:
         """The probability of each class, given that a performance is one of them.
