@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from scipy.special import ndtri
 
 from .anchors import KeyframeColumns
 from .consensus import exemplars_of_each, smooth_warps, vote
@@ -24,7 +25,7 @@ from .sharpening import Sharpener
 from .sizes import BATCH_NUMBERS, FRAMES
 from .tile import Bases
 from .trellis import Coupling, Trellis
-from .uncertainty import refined_uncertainty, uncertainty_of_paths
+from .uncertainty import uncertainty_of_paths
 from .units import Unit
 from .warps import evaluate_warps, normalise
 
@@ -468,7 +469,8 @@ class Warper:
         if not isinstance(self.finish, Refiner):
             return by_paths
         errors = self.finish.standard_errors(self.matcher.features.plain(positions), times)
-        return refined_uncertainty(by_paths, errors)
+        normal = np.ones(len(times), dtype=bool)
+        return by_paths._replace(half_widths=ndtri(0.95) * errors, is_normal=normal)
 
     def disparity_space(self, positions):
         """E(p, d) of the pattern and one trial at the pattern's rate (Eq. 12), and the path.

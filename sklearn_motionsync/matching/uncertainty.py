@@ -15,7 +15,7 @@ from .tile import Bases, Tile, right_factor
 from .trellis import Trellis
 from .warps import even_slices
 
-__all__ = ["Uncertainty", "coverage_factor", "refined_uncertainty", "uncertainty_of_paths"]
+__all__ = ["Uncertainty", "coverage_factor", "uncertainty_of_paths"]
 
 # Half-widths of 90 %, in mean distances of the paths: docs/design.md.
 _SCALE = 2.2
@@ -82,12 +82,6 @@ def uncertainty_of_paths(matcher, base, moving, times):
     widths = np.array([np.interp(frames, coarse, scale * row) for row in spread])
     widest = np.minimum(2 * widths.max(axis=1) / (n_frames - 1), 1)
     return Uncertainty(widths, np.zeros(len(times), bool), shares, widest)
-
-
-def refined_uncertainty(by_paths, errors):
-    """The uncertainty of refined warps, by their standard errors in frames."""
-    is_normal = np.ones(len(errors), bool)
-    return Uncertainty(ndtri(0.95) * errors, is_normal, by_paths.shares, by_paths.widest)
 
 
 def _coarse(matcher, n_frames, count):

@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     TimingChannel,
 )
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.display import MetricDisplay, SynchronizationDisplay, TrellisDisplay
 from sklearn_motionsync.metrics import SpreadScorer
 
 P = 40

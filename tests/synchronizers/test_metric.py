@@ -1,12 +1,9 @@
-"""DenseSynchronizer with a learnt metric: noise, people, and when no metric is learnt."""
+"""DenseSynchronizer with a learnt metric: noise, and when no metric is learnt."""
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-from sklearn_motionsync.datasets import load_performances
-
-P = 100
+from sklearn_motionsync import DenseSynchronizer
 
 
 @pytest.fixture(scope="module")
@@ -120,42 +117,3 @@ def test_metric_hardly_depends_on_the_number_of_frames(trials):
     X = trials[0]
     short, long = (DenseSynchronizer(p, max_offset=0.1).fit(X).metric_ for p in (100, 401))
     np.testing.assert_allclose(short.share, long.share, atol=0.05)
-
-
-# -- real people ------------------------------------------------------------------------
-
-
-def rise(h):
-    """Where a curve first passes the middle of its range upwards, as a share of the clip."""
-    over = h > (h.min() + h.max()) / 2
-    i = int(np.flatnonzero(~over[:-1] & over[1:])[0])
-    middle = (h.min() + h.max()) / 2
-    return (i + (middle - h[i]) / (h[i + 1] - h[i])) / (len(h) - 1)
-
-
-def errors_of(X, moments, **settings):
-    """Of all ordered pairs from every second pattern, in frames of 100."""
-    out = []
-    for n in range(0, len(X), 2):
-        times = DenseSynchronizer(P, n, **settings).fit(X).match(X).times
-        landed = np.array([np.interp(moments[n], np.arange(P), tau) for tau in times])
-        out.append(np.delete(np.abs(landed - moments), n))
-    return np.concatenate(out)
-
-
-@pytest.fixture(scope="module")
-def standing_up(real_data):
-    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
-    clips = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == "standUp"]
-    height = [x[:, 3 * bunch.joints.index("Head") + 1].astype(float) for x in clips]
-    heads = [gaussian_filter1d(h, max(0.03 * len(h), 0.6), mode="nearest") for h in height]
-    moments = np.array([rise(h) * (P - 1) for h in heads])
-    return ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(clips)), moments
-
-
-def test_errors_of_noisy_recordings_are_smaller_with_a_metric(standing_up):
-    """Heads of people standing up, halfway."""
-    X, moments = standing_up
-    learnt, plain = errors_of(X, moments), errors_of(X, moments, metric=None)
-    assert learnt.mean() < 0.6 * plain.mean()
-    assert np.median(learnt) < 0.6 * np.median(plain)

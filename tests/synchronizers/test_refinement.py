@@ -166,12 +166,3 @@ def test_people_are_not_refined(action, real_data):
         mine = [x for x, i in zip(postures, chosen, strict=True) if actor in (None, bunch.actor[i])]
         counts = (None, 2, 1) if actor is None else (None, 2)
         assert_not_refined_whatever_the_features(mine, counts)
-
-
-@pytest.mark.parametrize(("archive", "action"), [("utkinect", "pull"), ("cmu07_walk", None)])
-def test_people_of_other_data_sets_are_not_refined(archive, action, real_data):
-    """One subject walks, each time anew."""
-    bunch = load_performances(real_data / archive / f"{archive}_positions.npz")
-    X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if action in (None, t)]
-    X = [x for x in X if len(x) >= 8]
-    assert_not_refined_whatever_the_features(DirectionCosines(bunch.skeleton).fit_transform(X))
