@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 from scipy.ndimage import grey_opening
 
+from ..matching.warps import at_times
 from .axes import from_y_up, heading_axes, project_on_axes, to_y_up
 from .formats import LANDMARKS, SIDES
 from .landmarks import as_tuple, guess_feet
@@ -23,7 +24,6 @@ from .sphere import mean_direction, mean_length, mean_vector
 
 __all__ = [
     "Leg",
-    "at_frames",
     "blend_bodies",
     "blend_numbers",
     "find_stances",
@@ -57,7 +57,7 @@ def blend_numbers(arrays, frames, weights):
     ndarray, shape (n_frames, ...)
     """
     pairs = zip(arrays, frames, weights, strict=True)
-    return sum((at_frames(x, f).T * w).T for x, f, w in pairs)
+    return sum((at_times(x, f).T * w).T for x, f, w in pairs)
 
 
 def blend_bodies(arrays, frames, weights, skeleton):
@@ -99,23 +99,12 @@ def blend_bodies(arrays, frames, weights, skeleton):
     return blend
 
 
-def at_frames(x, frames):
-    """A sequence (n_frames, ...) at fractional frames, interpolated linearly."""
-    left, share = _neighbours(x, frames)
-    return ((x[left].T * (1 - share)) + (x[left + 1].T * share)).T
-
-
-def _neighbours(x, frames):
-    """The frame before each fractional frame, and the share of the one after it."""
-    left = np.minimum(frames.astype(np.intp), len(x) - 2)
-    return left, frames - left
-
-
 def _blend_vectors(arrays, frames, weights):
     """Vectors (n_frames_i, n_links, n_dims) blended in direction and in length."""
     vectors = []
     for x, f in zip(arrays, frames, strict=True):
-        left, share = _neighbours(x, f)
+        left = np.minimum(f.astype(np.intp), len(x) - 2)
+        share = f - left
         pair, shares = np.stack([x[left], x[left + 1]]), np.stack([1 - share, share])
         vectors.append(mean_vector(pair, shares[..., np.newaxis]))
     return mean_vector(np.stack(vectors), weights[..., np.newaxis])
@@ -127,7 +116,7 @@ def _blend_path(figures, frames, weights, size):
 
     Each step is taken along the heading of its own body.
     """
-    angles = np.stack([at_frames(x.angle, f) for x, f in zip(figures, frames, strict=True)])
+    angles = np.stack([at_times(x.angle, f) for x, f in zip(figures, frames, strict=True)])
     first = np.stack([np.cos(angles[:, 0]), np.sin(angles[:, 0])], axis=1)
     start = mean_direction(first, weights[:, 0])
     between = _between(weights)
@@ -135,7 +124,7 @@ def _blend_path(figures, frames, weights, size):
     angle = np.arctan2(start[1], start[0]) + np.concatenate([[0], np.cumsum(rotation)])
     steps = 0
     for x, f, heading, w in zip(figures, frames, angles, between, strict=True):
-        step = np.diff(at_frames(x.place, f), axis=0)[:, np.newaxis] / x.size
+        step = np.diff(at_times(x.place, f), axis=0)[:, np.newaxis] / x.size
         step = _rotate(step, _between(heading), inverse=True)[:, 0]
         steps = steps + w[:, np.newaxis] * step
     steps = steps * _between(size)[:, np.newaxis]
@@ -161,7 +150,7 @@ def _hold_feet(points, structure, arrays, figures, angle, frames, weights, size)
         stances = find_stances(points_of_trial, structure.legs, figure.size)
         stances = np.stack([np.interp(middle, np.arange(len(x) - 1), one) for one in stances])
         stands = stands + between * stances
-        track, facing = at_frames(points_of_trial[:, soles], f), at_frames(figure.angle, f)
+        track, facing = at_times(points_of_trial[:, soles], f), at_times(figure.angle, f)
         step = _rotate(np.diff(track, axis=0), _between(facing), inverse=True)
         step = _rotate(step, _between(angle))[..., [0, 2]].transpose(1, 0, 2) / figure.size
         steps = steps + (between * _between(size))[:, np.newaxis] * step

@@ -105,15 +105,15 @@ def at_times(sequence, times):
 
     Parameters
     ----------
-    sequence : ndarray, shape (n_frames, n_features)
+    sequence : ndarray, shape (n_frames, ...)
     times : ndarray, any shape
 
     Returns
     -------
-    ndarray, shape (*times.shape, n_features)
+    ndarray, shape (*times.shape, ...)
         In double precision.
     """
     times = np.clip(times, 0, len(sequence) - 1)
     before = np.minimum(times.astype(np.intp), len(sequence) - 2)
-    weight = (times - before)[..., np.newaxis]
+    weight = (times - before).reshape(*times.shape, *(1,) * (sequence.ndim - 1))
     return sequence[before] * (1 - weight) + sequence[before + 1] * weight
