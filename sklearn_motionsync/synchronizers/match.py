@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import reprlib
 from collections.abc import Iterator, Mapping
 from numbers import Real
@@ -26,7 +27,7 @@ from ..inputs.types import (
 )
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
-from ..matching.counting import ROUNDING
+from ..matching.counting import ROUNDING, first_largest
 from ..matching.warps import sample
 from ..utils.pipelines import route_to_synchronizer
 from .intervals import Intervals
@@ -47,6 +48,8 @@ __all__ = [
 STANDARD = 0.6827
 # Units of time of the clock of the pattern, and their symbols.
 UNITS = {"frames": "frames", "percent": "%", "seconds": "s"}
+# Performances in the table for notebooks.
+_SHOWN = 10
 # The smallest rate, so that logarithms are finite.
 _SLOWEST = 0.01
 
@@ -252,6 +255,8 @@ class Match:
         unit: Unit,
         X: PerformancesLike | ValuesLike | None = None,
         frame_rate: float | ValuesLike | None = None,
+        *,
+        coverage: float | None = None,
     ) -> np.ndarray:
         """How much later than the pattern performances are at every frame of it, in a unit of time.
 
@@ -268,19 +273,27 @@ class Match:
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             For seconds: frames per second of X. By default what tables tell: an index in seconds,
             or ``attrs["frame_rate"]`` of `io.read_motion`.
+        coverage : float, default=None
+            Probability of the intervals of ``interval``, such as 0.9. None for none.
 
         Returns
         -------
-        ndarray, shape (n_sequences, P)
-            Positive where a performance is later than the pattern.
+        ndarray, shape (n_sequences, P), or (3, n_sequences, P)
+            Positive where a performance is later than the pattern. With a coverage the offsets, and
+            the lower and upper bounds of their intervals.
 
         Raises
         ------
         ValueError
             If there is no such unit, or X or the frame rate is missing for seconds; and as from
-            ``seconds``.
+            ``seconds``, and with a coverage from ``interval``.
         """
-        return self._in_unit(self.offsets, unit, X, frame_rate)
+        offsets = self._in_unit(self.offsets, unit, X, frame_rate)
+        if coverage is None:
+            return offsets
+        frames = np.arange(self.times.shape[1])
+        bounds = (self._in_unit(b - frames, unit, X, frame_rate) for b in self.interval(coverage))
+        return np.stack([offsets, *bounds])
 
     def to_frame(
         self,
@@ -516,12 +529,43 @@ class Match:
         n_sequences, n_frames = self.times.shape
         return f"Match({counted(n_sequences, 'performance')} on {n_frames} frames)"
 
+    def _repr_html_(self):
+        """A table for notebooks: how late each of the first performances is, and when."""
+        percent = 100 * self.offsets / (self.times.shape[1] - 1)
+        largest = max(np.abs(percent).max(initial=0), 1e-9)
+        rows = []
+        for i, offsets in enumerate(percent[:_SHOWN]):
+            at = first_largest(np.abs(offsets))
+            word = "late" if offsets[at] > 0 else "early"
+            when = f"{abs(offsets[at]):.1f} % {word}, at {100 * at / (len(offsets) - 1):.0f} %"
+            rows.append(
+                f"<tr><td>{i}</td><td>{when}</td><td>{_sparkline(offsets, largest)}</td></tr>"
+            )
+        more = len(percent) - len(rows)
+        tail = f"<p>and {counted(more, 'performance')} more</p>" if more else ""
+        return (
+            f"<p>{html.escape(repr(self))}; offsets of at most {largest:.1f} % of the pattern</p>"
+            "<table><thead><tr><th></th><th>largest offset</th><th>offset, late is up</th></tr>"
+            f"</thead><tbody>{''.join(rows)}</tbody></table>{tail}"
+        )
+
     def _check_count(self, given, noun):
         if len(given) != len(self.times):
             raise ValueError(
                 f"{counted(len(self.times), 'matched performance')}, but "
                 f"{counted(len(given), noun)}: give one for each, in the same order."
             )
+
+
+def _sparkline(values, largest):
+    """A curve as a small picture (SVG), from ``-largest`` to ``largest``."""
+    xs, ys = np.linspace(0, 120, len(values)), 12 - 11 * values / largest
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(xs, ys, strict=True))
+    return (
+        '<svg width="120" height="24" viewBox="0 0 120 24" role="img">'
+        '<line x1="0" y1="12" x2="120" y2="12" stroke="currentColor" stroke-opacity="0.3"/>'
+        f'<polyline points="{points}" fill="none" stroke="#0072B2" stroke-width="1.5"/></svg>'
+    )
 
 
 def check_coverage(coverage):
