@@ -148,7 +148,7 @@ def test_busy_workers_keep_no_data_after_a_fit(client):
 
 def test_warping_sends_every_performance_to_one_worker(client):
     X = walks(100, 60, 8)
-    many = np.concatenate([X] * 15)
+    many = np.concatenate([X] * 6)
     sync = DenseSynchronizer().fit(X)
     expected = sync.transform(many)
     before = received(client) - moved(client)
