@@ -110,9 +110,9 @@ def _horizontal(directions):
     """Horizontal directions as unit complex numbers x + iz; NaN of hidden and vertical ones."""
     size = np.hypot(directions[:, 0], directions[:, 2])
     shown = size > np.sqrt(np.finfo(directions.dtype).eps)
-    found = np.full(len(size), np.nan, dtype=np.result_type(directions.dtype, np.complex64))
-    found[shown] = (directions[shown, 0] + 1j * directions[shown, 2]) / size[shown]
-    return found
+    units = np.full(len(size), np.nan, dtype=np.result_type(directions.dtype, np.complex64))
+    units[shown] = (directions[shown, 0] + 1j * directions[shown, 2]) / size[shown]
+    return units
 
 
 def _last_known(values):
@@ -153,14 +153,14 @@ def convert_to_parent_axes(cosines, limbs, *, inverse=False):
     for i, (name, limb) in enumerate(LIMBS.items()):
         if name not in limbs:
             continue
-        given, above = cosines[:, i : i + 1], nearest_ancestor(name, limbs)
+        cosine, above = cosines[:, i : i + 1], nearest_ancestor(name, limbs)
         if above is None:
-            local = whole = given
+            local = whole = cosine
             parent = np.broadcast_to(np.eye(3, dtype=cosines.dtype), (len(cosines), 3, 3))
         else:
             parent = axes_of[above]
-            local = given if inverse else project_on_axes(given, parent)
-            whole = given @ parent if inverse else given
+            local = cosine if inverse else project_on_axes(cosine, parent)
+            whole = cosine @ parent if inverse else cosine
         out[:, i : i + 1] = whole if inverse else local
         axes_of[name] = _swing(limb.rest, local[:, 0]) @ parent
     return out[..., :n_dims]

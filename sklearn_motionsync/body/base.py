@@ -152,12 +152,12 @@ class Body:
         """Features (n_frames, n_features) that a function gives for every portion."""
         out = None
         for rows in self._slices:
-            found = function(self._portion(rows), self)
+            part = function(self._portion(rows), self)
             if len(self._slices) == 1:
-                return found
+                return part
             if out is None:
-                out = np.empty((len(self.lengths), found.shape[1]), found.dtype)
-            out[rows] = found
+                out = np.empty((len(self.lengths), part.shape[1]), part.dtype)
+            out[rows] = part
         return out
 
     def _points_and_limbs(self, rows):
@@ -189,12 +189,12 @@ class Body:
         """Directions (n_frames, 3) to the left, if the first limb that gives them is hidden."""
         if not self._lateral or not np.isnan(self.lengths[:, self._lateral[0]]).any():
             return None
-        found = [[] for _ in self._lateral]
+        directions = [[] for _ in self._lateral]
         for rows in self._slices:
             limbs = self._points_and_limbs(rows)[1]
-            for of_limb, k in zip(found, self._lateral, strict=True):
+            for of_limb, k in zip(directions, self._lateral, strict=True):
                 of_limb.append(self._directions(k, limbs, rows))
-        return fill_heading(*map(np.concatenate, found))
+        return fill_heading(*map(np.concatenate, directions))
 
     def _check_lengths(self, largest, called):
         """Refuse limbs without length; those that are not there have length 0."""
@@ -323,15 +323,15 @@ class PositionsTransformer(
                 lengths.append(self._body(performances, i).lengths)
                 step()
         lengths = np.concatenate(lengths) if len(lengths) > 1 else lengths[0]
-        found = median_lengths(lengths)[limb_indices(limbs)]
-        if np.isnan(found).any():
-            never = [name for name, length in zip(limbs, found, strict=True) if np.isnan(length)]
+        medians = median_lengths(lengths)[limb_indices(limbs)]
+        if np.isnan(medians).any():
+            never = [name for name, length in zip(limbs, medians, strict=True) if np.isnan(length)]
             raise ValueError(
                 f"The limbs {never} are hidden in every frame of every performance, so that their "
                 "lengths cannot be learnt. Fit on performances that show them, or leave their "
                 "landmarks out of the skeleton: Skeleton(..., landmarks={'left_wrist': None, ...})."
             )
-        return found
+        return medians
 
     def _lengths_of(self, body):
         """Lengths (12,) of the limbs of a body; hidden ones are those of ``fit``, scaled to it."""
@@ -340,9 +340,9 @@ class PositionsTransformer(
 
     def _all_lengths(self, lengths):
         """Lengths (12,) of all limbs, 0 of those that the skeleton lacks."""
-        found = np.zeros(len(LIMB_NAMES), dtype=lengths.dtype)
-        found[limb_indices(self.skeleton.limbs)] = lengths
-        return found
+        of_all = np.zeros(len(LIMB_NAMES), dtype=lengths.dtype)
+        of_all[limb_indices(self.skeleton.limbs)] = lengths
+        return of_all
 
     def _check(self, X, *, reset):
         finite = self._finite

@@ -296,11 +296,11 @@ class DirectionCosines(PositionsTransformer):
     def _positions(self, performances, i, lengths):
         postures, limbs = performances[i], self.skeleton.limbs
         first, n_dims = int(self.skeleton.has_height), self.skeleton.n_dims
-        given = postures[:, first:].reshape(len(postures), -1, n_dims)
-        if not given.all():
+        by_limb = postures[:, first:].reshape(len(postures), -1, n_dims)
+        if not by_limb.all():
             # A picture may show hips and shoulders end-on.
             end_on = np.array([n_dims == 2 and name in LATERAL_LIMBS for name in limbs])
-            zero = ~given.any(axis=2) & ~end_on
+            zero = ~by_limb.any(axis=2) & ~end_on
             if zero.any():
                 frame, limb = np.argwhere(zero)[0]
                 raise ValueError(
@@ -309,8 +309,8 @@ class DirectionCosines(PositionsTransformer):
                     "direction."
                 )
         # Means and approximations of cosines are shorter than 1.
-        cosines = np.zeros((len(given), len(LIMB_NAMES), n_dims), dtype=given.dtype)
-        cosines[:, limb_indices(limbs)] = unit_vectors(given)
+        cosines = np.zeros((len(by_limb), len(LIMB_NAMES), n_dims), dtype=by_limb.dtype)
+        cosines[:, limb_indices(limbs)] = unit_vectors(by_limb)
         if self.reference == "parent":
             cosines = convert_to_parent_axes(cosines, limbs, inverse=True)
         heights = postures[:, 0] if first else None

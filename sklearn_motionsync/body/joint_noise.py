@@ -116,6 +116,6 @@ class JointNoise:
         for _ in range(_DRAWS):
             size = len(positions), skeleton.n_dims * len(skeleton.joints)
             moved = landmark_positions(self.sd * rng.standard_normal(size), skeleton)[:, order]
-            (found,) = again.transform([positions + moved.reshape(positions.shape)])
-            moments += (found - exact).T @ (found - exact)
+            (noisy,) = again.transform([positions + moved.reshape(positions.shape)])
+            moments += (noisy - exact).T @ (noisy - exact)
         return moments / (_DRAWS * len(positions))

@@ -71,12 +71,12 @@ def guess_feet(joints, landmarks):
     """The joints at heels and toes, ``left_heel`` and so on, as far as names tell."""
     plain, held = _plain_names(joints), {j for at in landmarks.values() for j in as_tuple(at)}
     plain = {name: joint for name, joint in plain.items() if joint not in held}
-    found = {
+    joint_at = {
         f"{side}_{part}": _find(plain, side, synonyms)
         for side in SIDES
         for part, synonyms in _ENDS_OF_FEET.items()
     }
-    return {name: joint for name, joint in found.items() if joint is not None}
+    return {name: joint for name, joint in joint_at.items() if joint is not None}
 
 
 def add_midpoints(landmarks):
@@ -88,14 +88,14 @@ def add_midpoints(landmarks):
     return landmarks
 
 
-def missing_counterparts(landmarks, given):
+def missing_counterparts(landmarks, named):
     """Landmarks that are missing while the other side was guessed, unless they were given."""
     return [
         name
         for name in LANDMARKS
-        if name not in {*landmarks, *given}
+        if name not in {*landmarks, *named}
         and (other := other_side(name)) in landmarks
-        and other not in given
+        and other not in named
     ]
 
 
@@ -129,18 +129,18 @@ def _plain(name):
 
 def _guess_by_synonyms(plain):
     """The joint of each landmark that a synonym or a pair of joints gives."""
-    found = {}
+    joint_at = {}
     for landmark in LANDMARKS:
         side, _, part = landmark.rpartition("_")
         joint = _find(plain, side, _SYNONYMS[part])
         if joint is not None:
-            found[landmark] = joint
+            joint_at[landmark] = joint
     for landmark, pairs in _PAIRS.items():
         for side, name, other, other_name in pairs:
             pair = _find(plain, side, (name,)), _find(plain, other, (other_name,))
-            if landmark not in found and None not in pair:
-                found[landmark] = pair
-    return found
+            if landmark not in joint_at and None not in pair:
+                joint_at[landmark] = pair
+    return joint_at
 
 
 def _find(plain, side, synonyms):

@@ -148,29 +148,29 @@ def _counterparts(skeleton):
         for name, at in landmarks.items()
         if other_side(name)
     ]
-    sided = {joint for own, _ in pairs for joint in own}
-    found = {}
-    for own, other in pairs:
-        if len(own) == len(other) == 1:
-            found.setdefault(own[0], other[0])
+    sided = {joint for one, _ in pairs for joint in one}
+    other_of = {}
+    for one, other in pairs:
+        if len(one) == len(other) == 1:
+            other_of.setdefault(one[0], other[0])
     lower = {joint.lower(): joint for joint in reversed(joints)}
     for joint in joints:
-        if joint not in found and (other := _find_by_name(joint, lower)) is not None:
-            found[joint] = other
+        if joint not in other_of and (other := _find_by_name(joint, lower)) is not None:
+            other_of[joint] = other
     # Joints of means that are not paired by names are paired in their order.
-    for own, other in pairs:
-        left, right = ([j for j in of_side if j not in found] for of_side in (own, other))
+    for one, other in pairs:
+        left, right = ([j for j in of_side if j not in other_of] for of_side in (one, other))
         if len(left) == len(right):
             for a, b in zip(left, right, strict=True):
-                found[a], found[b] = b, a
+                other_of[a], other_of[b] = b, a
     middle = {j for name in LANDMARKS[:3] for j in as_tuple(landmarks.get(name, ()))}
-    alone = [joint for joint in joints if joint not in found and joint not in middle]
+    alone = [joint for joint in joints if joint not in other_of and joint not in middle]
     for joint in joints:
-        other = found.get(joint, joint)
+        other = other_of.get(joint, joint)
         lacks = other == joint and (joint in sided or re.search("left|right", joint.lower()))
-        if (lacks and joint not in middle) or found.get(other, other) != joint:
+        if (lacks and joint not in middle) or other_of.get(other, other) != joint:
             raise ValueError(_no_counterpart(joint, "on one side", joints))
-    return [joints.index(found.get(joint, joint)) for joint in joints], [
+    return [joints.index(other_of.get(joint, joint)) for joint in joints], [
         joints.index(joint) for joint in alone
     ]
 
@@ -188,7 +188,7 @@ def _find_by_name(joint, lower):
     swapped = {"left": "right", "right": "left", "l": "r", "r": "l"}
     # "left" anywhere; "l" as a word, at the beginning, at the end ...
     words = ("left|right", r"(?<![a-z0-9])[lr](?![a-z0-9])", "^[lr]", "[lr]$")
-    others = [re.sub(word, lambda found: swapped[found.group()], name) for word in words]
+    others = [re.sub(word, lambda match: swapped[match.group()], name) for word in words]
     # ... or after a prefix that a program put before every name.
     others += [
         name[:k] + swapped[letter] + name[k + 1 :]
@@ -243,7 +243,7 @@ def exchange_of_sides(names, limbs=None):
         there is no left and right.
     """
     names = [str(name) for name in names]
-    columns, signs, found = np.arange(len(names)), np.ones(len(names)), False
+    columns, signs, has_sides = np.arange(len(names)), np.ones(len(names)), False
     for k, name in enumerate(names):
         limb, _, axis = name.rpartition("_")
         if limb not in LIMBS or axis not in AXES[3] or (limbs is not None and limb not in limbs):
@@ -251,8 +251,8 @@ def exchange_of_sides(names, limbs=None):
         other = other_side(limb) or limb
         if f"{other}_{axis}" not in names:
             return None
-        found |= other != limb
+        has_sides |= other != limb
         columns[k] = names.index(f"{other}_{axis}")
         # Hip line and shoulder line go from right to left: their mirror images the other way.
         signs[k] = -1 if (axis == AXES[3][0]) != (limb in LATERAL_LIMBS) else 1
-    return (columns, signs) if found else None
+    return (columns, signs) if has_sides else None

@@ -164,14 +164,14 @@ class Skeleton:
                 f"up must be {', '.join(map(repr, list(ups)[:-1]))} or {list(ups)[-1]!r}, got "
                 f"{self.up!r}."
             )
-        given = {} if self.landmarks is None else _as_landmarks(self.landmarks)
-        landmarks = given
+        named = {} if self.landmarks is None else _as_landmarks(self.landmarks)
+        landmarks = named
         if self.landmarks is None:
             landmarks = add_midpoints(guess_landmarks(joints))
         object.__setattr__(self, "joints", joints)
         object.__setattr__(self, "parents", parents)
         object.__setattr__(self, "n_dims", int(self.n_dims))
-        object.__setattr__(self, "landmarks", _check_landmarks(landmarks, given, joints))
+        object.__setattr__(self, "landmarks", _check_landmarks(landmarks, named, joints))
 
     # In files the landmarks are a plain dict.
 
@@ -246,12 +246,12 @@ class Skeleton:
                 f"The columns of the joints {twice} are repeated; use "
                 "df.loc[:, ~df.columns.duplicated()]."
             )
-        given = {} if landmarks is None else _as_landmarks(landmarks)
+        named = {} if landmarks is None else _as_landmarks(landmarks)
         attrs = getattr(df, "attrs", {})
         names = _as_joints(attrs.get("joints", ()))
         # Renamed columns are not joints of the file.
         guess = guess_landmarks(joints, names if set(joints) <= set(names) else ())
-        all_landmarks = _check_landmarks(add_midpoints(guess | given), given, joints)
+        all_landmarks = _check_landmarks(add_midpoints(guess | named), named, joints)
         parents = _nearest_parents(joints, names, _as_parents(attrs.get("parents", ())))
         held = {joint for at in all_landmarks.values() for joint in as_tuple(at)}
         parents = _without_still_roots(df, joints, parents, held)
@@ -573,14 +573,14 @@ def _as_landmark(landmark, at):
     return str(joints[0]) if len(joints) == 1 else tuple(map(str, joints))
 
 
-def _check_landmarks(landmarks, given, joints):
+def _check_landmarks(landmarks, named, joints):
     """The landmarks that are not None, in their order; a refusal if they form no limb.
 
     Guessed landmarks must come in pairs of left and right, given ones need not.
     """
     there = {name: landmarks[name] for name in LANDMARKS if landmarks.get(name) is not None}
     absent = [name for name, at in there.items() if not set(as_tuple(at)) <= set(joints)]
-    missing = absent or missing_counterparts(there, given)
+    missing = absent or missing_counterparts(there, named)
     if not missing and not limbs_between(there):
         missing = [name for name in LANDMARKS if name not in there]
     if missing:

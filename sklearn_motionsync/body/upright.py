@@ -102,11 +102,11 @@ def check_upright(heights, points, lengths, skeleton, what):
     rise = _seen_rises(bottom, top).mean(axis=0)
     if lower is not None and len(trunk):
         rise = rise + trunk.mean(axis=0)
-    found = _nearest_axis(from_y_up(rise, skeleton))
+    likely = _nearest_axis(from_y_up(rise, skeleton))
     raise ValueError(
-        f"{what} is upside down: the skeleton says that {skeleton.up!r} is up, but {found!r} seems "
-        f"to be. Turn the skeleton, not the positions: Skeleton(..., up={found!r}), or "
-        f"Skeleton.from_frame(df, up={found!r})."
+        f"{what} is upside down: the skeleton says that {skeleton.up!r} is up, but {likely!r} "
+        f"seems to be. Turn the skeleton, not the positions: Skeleton(..., up={likely!r}), or "
+        f"Skeleton.from_frame(df, up={likely!r})."
     )
 
 

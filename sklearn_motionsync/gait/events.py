@@ -145,19 +145,19 @@ def gait_events(
     return recordings.stack(tables)
 
 
-def events_of(walk, given=None):
+def events_of(walk, known=None):
     """The events of a recording by time: label, side, and sample, with a fraction.
 
     Parameters
     ----------
     walk : Walk
-    given : list of (str, str, float), default=None
-        Events known already, with rows, as from `Recordings.split_events`. By default they are
-        found.
+    known : list of (str, str, float), default=None
+        Events that are known already, with rows, as from `Recordings.split_events`. By default
+        they are found.
     """
-    if given is None:
+    if known is None:
         return _find_events(walk)
-    return [(label, side, row * walk.per_frame) for label, side, row in given]
+    return [(label, side, row * walk.per_frame) for label, side, row in known]
 
 
 def tabulate_events(recordings, i, walk, events):

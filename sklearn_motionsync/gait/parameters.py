@@ -106,10 +106,10 @@ def gait_parameters(
     """
     recordings = Recordings(X, skeleton, feet, frame_rate)
     tables = []
-    for i, given in enumerate(recordings.split_events(events)):
+    for i, known in enumerate(recordings.split_events(events)):
         walk = recordings.walk(i)
-        found = events_of(walk, given)
-        tables.append(_parameters(walk, found, *recordings.length_of_leg(i, walk)))
+        events_of_walk = events_of(walk, known)
+        tables.append(_parameters(walk, events_of_walk, *recordings.length_of_leg(i, walk)))
     stacked = recordings.stack(tables)
     return stacked.set_index([*recordings.levels, "parameter"])
 

@@ -139,7 +139,7 @@ class Recordings:
         if set(self.levels) <= set(columns):
             keys = list(table[self.levels].itertuples(index=False, name=None))
             keys = [key[0] if len(self.levels) == 1 else key for key in keys]
-        found = [[] for _ in self._labels]
+        by_recording = [[] for _ in self._labels]
         sides = {context.casefold(): side for side, context in CONTEXTS.items()}
         rows = zip(keys, table["label"], table["context"], table[time], strict=True)
         for key, label, context, value in rows:
@@ -157,8 +157,8 @@ class Recordings:
                     f"{within(self.called(i))}. Leave its row out, or give the events of these "
                     "recordings."
                 )
-            found[i].append((label, side, float(at)))
-        return [sorted(own, key=lambda event: event[2]) for own in found]
+            by_recording[i].append((label, side, float(at)))
+        return [sorted(events_of_one, key=lambda event: event[2]) for events_of_one in by_recording]
 
     def stack(self, tables):
         """Tables of recordings below each other, with the labels of recordings in columns."""
@@ -219,8 +219,8 @@ def joints_of_feet(skeleton, feet=None):
     dict of str to tuple of int
         Without those that are not known.
     """
-    given = {} if feet is None else dict(feet)
-    for name, joints in given.items():
+    named = {} if feet is None else dict(feet)
+    for name, joints in named.items():
         if name not in _ENDS_OF_FEET:
             raise ValueError(f"feet: {name!r} is none of {', '.join(_ENDS_OF_FEET)}.")
         for joint in () if joints is None else as_tuple(joints):
@@ -229,7 +229,7 @@ def joints_of_feet(skeleton, feet=None):
                     f"feet: {name!r} is at {joint!r}, which is no joint of the skeleton; it has "
                     f"{list(skeleton.joints)[:40]}."
                 )
-    known = guess_feet(skeleton.joints, skeleton.landmarks) | given
+    known = guess_feet(skeleton.joints, skeleton.landmarks) | named
     return {
         name: tuple(skeleton.joints.index(joint) for joint in as_tuple(joints))
         for name, joints in known.items()

@@ -178,13 +178,13 @@ class CausalTrellis:
         """Start a new path of one stream at its next sample."""
         self._begins[stream] = True
 
-    def advance(self, samples, own=None, moves=None):
+    def advance(self, samples, partial=None, moves=None):
         """Take one sample of every stream.
 
         Parameters
         ----------
         samples : ndarray, shape (n_streams, n_features)
-        own : dict of {tuple of int: (ndarray (n, n_features'), ndarray (Q, n_features'))}
+        partial : dict of {tuple of int: (ndarray (n, n_features'), ndarray (Q, n_features'))}
             For streams with missing features: the observed features of their samples and of
             the moving sequence; None where all are missing.
         moves : ndarray of bool, shape (n_streams,), default=None
@@ -197,7 +197,7 @@ class CausalTrellis:
         local = tile.costs_of_sample(p, self._left(samples), 0, high)
         by_stream = local.reshape(len(local), high + 1, -1)
         self._energy += np.vecdot(samples, samples)
-        for streams, parts in (own or {}).items():
+        for streams, parts in (partial or {}).items():
             by_stream[:, :, streams] = self._costs_of_part(parts, len(streams), high)
         if p > 0:
             self._lead_in(p)

@@ -256,8 +256,8 @@ class RateProcess(NamedTuple):
 
     def predict(self, log_rates, dt):
         """Means of log rates after a time, and their standard deviation."""
-        kept = np.exp(-dt / self.memory)
-        return kept * log_rates, self.spread * np.sqrt(1 - kept**2)
+        left = np.exp(-dt / self.memory)
+        return left * log_rates, self.spread * np.sqrt(1 - left**2)
 
 
 def _moments(deviations):
@@ -295,13 +295,13 @@ def _correlation_lag(series, level):
 def _causal_slopes(deviations, step, window):
     """Causal velocities (n, P - 1, n_features), and their variances by unit noise (P - 1,)."""
     n, n_frames, width = deviations.shape
-    slopes, seen, found = CausalSlopes(n, width, window), np.ones(width, dtype=bool), []
+    slopes, seen, fits = CausalSlopes(n, width, window), np.ones(width, dtype=bool), []
     for p in range(n_frames):
         slopes.advance(step)
         slopes.add(deviations[:, p], seen)
         if p:
-            found.append(slopes.fit(seen))
-    values, noise = zip(*found, strict=True)
+            fits.append(slopes.fit(seen))
+    values, noise = zip(*fits, strict=True)
     return np.stack(values, axis=1), np.array([a[0] for a in noise])
 
 

@@ -18,6 +18,7 @@ from ..inputs.types import Indexed, NumbersLike, PerformancesLike, SupportsArray
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..inputs.wording import counted
 from ..matching.costs import step_table
+from ..matching.counting import first_largest
 from ..matching.filters import SMOOTHING
 from ..matching.matcher import cost_features
 from ..matching.metric import Metric, compressed
@@ -600,7 +601,7 @@ def calibrate(reference_of, performances, warped, times, progress):
     if whole.cyclic:
         # Cycles of new people cost more than those of the training set, less than standing still.
         typical_cost = min(np.sqrt(typical_cost * standing), standing / _STANDING)
-    temperature = float(energy * _TEMPERATURES[scores.argmax()])
+    temperature = float(energy * _TEMPERATURES[first_largest(scores)])
     enough = np.append(np.flatnonzero(shares >= _COVERAGE), len(shares) - 1)[0]
     interval_temperature = _NEW_PEOPLE[whole.cyclic] * energy * _TEMPERATURES[enough]
     return temperature, float(typical_cost), float(interval_temperature)

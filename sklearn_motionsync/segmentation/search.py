@@ -227,13 +227,13 @@ def _search_takes(takes, propose, dissimilarity, threshold, coverage, progress):
     return out
 
 
-def _at_rate_of(pattern, X, given, frame_rate, pattern_rate):
+def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
     """Takes at the frame rate of the training set.
 
     Parameters
     ----------
     pattern, frame_rate, pattern_rate : as for `find_performances`
-    X, given : the takes, and the same, checked
+    X, checked : the takes, and the same, checked
 
     Returns
     -------
@@ -244,14 +244,15 @@ def _at_rate_of(pattern, X, given, frame_rate, pattern_rate):
     known : bool
         Whether any frame rate is known.
     """
-    rates = [facts.get("frame_rate") for facts in given.facts] or [None] * len(given)
+    rates = [facts.get("frame_rate") for facts in checked.facts] or [None] * len(checked)
     if frame_rate is not None:
-        rates = np.broadcast_to(as_frame_rates(frame_rate, len(given)).ravel(), len(given)).tolist()
+        n = len(checked)
+        rates = np.broadcast_to(as_frame_rates(frame_rate, n).ravel(), n).tolist()
     rate_of_pattern = _frame_rate_of(pattern) if pattern_rate is None else float(pattern_rate)
     unsure = [i for i, rate in enumerate(rates) if (rate is None) != (rate_of_pattern is None)]
     if unsure:
         rate = rates[unsure[0]]
-        first, second = ("The pattern", given.called(unsure[0]))[
+        first, second = ("The pattern", checked.called(unsure[0]))[
             :: 1 if rate_of_pattern is None else -1
         ]
         warnings.warn(
@@ -272,12 +273,12 @@ def _at_rate_of(pattern, X, given, frame_rate, pattern_rate):
     for i, pace in enumerate(paces):
         if not 1 / _MOST <= pace <= _MOST:
             raise ValueError(
-                f"{given.called(i)} has {rates[i]:g} frames a second, the pattern "
+                f"{checked.called(i)} has {rates[i]:g} frames a second, the pattern "
                 f"{rate_of_pattern:g}: one is more than {_MOST} times the other. Correct the wrong "
                 "one, attrs['frame_rate'], an index in seconds, frame_rate or pattern_rate."
             )
         if pace != 1:
-            searched[i] = _resample(searched[i], given[i], pace, rate_of_pattern)
+            searched[i] = _resample(searched[i], checked[i], pace, rate_of_pattern)
     return searched, paces, is_known
 
 
