@@ -290,11 +290,11 @@ _COLUMNS += ["direction", "size", "lower", "upper", "unit"]
 def _clusters(what, family, values, names, units, study, least, level):
     """Rows of the table: stretches of frames with a corrected p of the level at most."""
     # The share of permutations in which shape or timing has a p as small.
-    p = share_at_most(least, family.shares(np.abs(family.found)))
+    p = share_at_most(least, family.shares(np.abs(family.observed)))
     for k, feature in enumerate(names):
         for first, end in runs_of(p[:, k] <= level).tolist():
             stretch = slice(first, end)
-            peak = first + first_largest(np.abs(family.found[stretch, k]))
+            peak = first + first_largest(np.abs(family.observed[stretch, k]))
             size = study.size(values[:, stretch, k].mean(axis=1), what)
             yield [what, feature, first, end - 1, peak, p[stretch, k].min(), *size, units[k]]
 

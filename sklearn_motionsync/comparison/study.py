@@ -306,10 +306,10 @@ def band_of_mean(values, statistic, coverage):
     return values.mean(axis=0), spread
 
 
-def _means(persons, some=None):
+def _means(persons, in_group=None):
     """The matrix whose product with values is the mean of each person, (n_people, n_sequences)."""
     belongs = persons == np.arange(persons.max() + 1)[:, np.newaxis]
-    belongs = belongs if some is None else belongs & some
+    belongs = belongs if in_group is None else belongs & in_group
     return belongs / np.maximum(belongs.sum(axis=1, keepdims=True), 1)
 
 
@@ -435,7 +435,7 @@ class Family:
 
     Parameters
     ----------
-    found : ndarray, shape (P, n_features)
+    observed : ndarray, shape (P, n_features)
         Enhanced values of the design itself, with signs.
     largest : ndarray, shape (1 + n_permutations,)
         The largest absolute value of each draw, that of the design first.
@@ -446,8 +446,8 @@ class Family:
         The share of draws that are at least as large.
     """
 
-    def __init__(self, found, largest):
-        self.found, self.largest = found, largest
+    def __init__(self, observed, largest):
+        self.observed, self.largest = observed, largest
         self.ranks = self.shares(largest)
 
     @property

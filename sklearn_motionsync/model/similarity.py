@@ -92,7 +92,7 @@ class Weights(NamedTuple):
 _FIXED = Weights()
 
 
-def learn_weights(performances, groups, own=False):
+def learn_weights(performances, groups, within_groups=False):
     """Weights by how performances of an action differ.
 
     A feature has the factor ``v^(-1/4)``, where v is its variance among performances less their own
@@ -104,7 +104,7 @@ def learn_weights(performances, groups, own=False):
     performances : ndarray (n, P, n_features), float64
         Without gaps.
     groups : ndarray of int (n,)
-    own : bool, default=False
+    within_groups : bool, default=False
         Weights to compare a performance with others of its group, instead of those of other groups:
         features have equal factors, mean postures make a fifth, and the nearest one decides alone.
 
@@ -113,7 +113,7 @@ def learn_weights(performances, groups, own=False):
     Weights
     """
     n, n_frames, _ = performances.shape
-    share, n_nearest = (_OWN_MEAN_SHARE, 1) if own else (_MEAN_SHARE, _N_NEAREST_LEARNT)
+    share, n_nearest = (_OWN_MEAN_SHARE, 1) if within_groups else (_MEAN_SHARE, _N_NEAREST_LEARNT)
     energies, floor = movement_energies(performances)
     if energies.max() <= floor:
         # All stand still: mean postures alone tell them apart.
@@ -123,10 +123,10 @@ def learn_weights(performances, groups, own=False):
     variance = moved.var(axis=0).mean(axis=0)
     largest = variance.max()
     scale = np.ones(len(variance))
-    if not own and largest > LEAST * np.square(moved).mean():
+    if not within_groups and largest > LEAST * np.square(moved).mean():
         scale = (largest / np.maximum(variance, _LEAST_VARIANCE * largest)) ** 0.25
     moved, means = (moved * scale).reshape(n, -1), means * scale
-    is_pair = np.triu((groups[:, np.newaxis] == groups) == own, 1)
+    is_pair = np.triu((groups[:, np.newaxis] == groups) == within_groups, 1)
     apart, offset = (
         distances_by_products(x, x)[is_pair] for x in (moved, means - means.mean(axis=0))
     )
@@ -199,26 +199,26 @@ class Neighbours:
         -------
         ndarray (n,)
         """
-        found = np.empty(len(performances))
+        dissimilarities = np.empty(len(performances))
         for rows in even_slices(len(performances), _BATCH):
-            some = np.asarray(performances[rows], dtype=np.float64)
+            batch = np.asarray(performances[rows], dtype=np.float64)
             # The path of a performance depends on no other one.
-            gaps = np.full(len(some), self._seen is not None)
+            gaps = np.full(len(batch), self._seen is not None)
             if self._mean is not None:
-                gaps |= np.isnan(some.sum(axis=(1, 2)))
+                gaps |= np.isnan(batch.sum(axis=(1, 2)))
             if gaps.any():
-                ratios = np.empty((len(some), len(self._groups)))
+                ratios = np.empty((len(batch), len(self._groups)))
                 if not gaps.all():
-                    ratios[~gaps] = self._ratios(some[~gaps])
-                ratios[gaps] = list(map(self._ratios_of_seen, some[gaps]))
+                    ratios[~gaps] = self._ratios(batch[~gaps])
+                ratios[gaps] = list(map(self._ratios_of_seen, batch[gaps]))
             else:
-                ratios = self._ratios(some)
+                ratios = self._ratios(batch)
             if groups is not None:
                 ratios[groups[rows, np.newaxis] == self._groups] = np.inf
             nearest = np.sort(ratios, axis=1)[:, : self._weights.n_nearest]
             counts = np.isfinite(nearest)
-            found[rows] = np.where(counts, nearest, 0).sum(axis=1) / counts.sum(axis=1)
-        return found
+            dissimilarities[rows] = np.where(counts, nearest, 0).sum(axis=1) / counts.sum(axis=1)
+        return dissimilarities
 
     def limit(self, moments, coverage):
         """Largest dissimilarity that a share of new performances is expected to have.
@@ -295,13 +295,13 @@ class PersonalReference:
 
     Parameters
     ----------
-    kept : ndarray (n_kept, P, n_features), float64
-        Training performances; NaN in gaps.
+    training : ndarray (n_kept, P, n_features), float64
+        Training performances that are kept; NaN in gaps.
     groups : ndarray of int (n_kept,)
         The person of each.
     mean : ndarray (P, n_features)
         Of all training performances.
-    own : ndarray (m, P, n_features)
+    reference : ndarray (m, P, n_features)
         Of the person; NaN in gaps.
 
     Attributes
@@ -312,7 +312,7 @@ class PersonalReference:
         These dissimilarities; NaN for people with one performance.
     """
 
-    def __init__(self, kept, groups, mean, own):
+    def __init__(self, training, groups, mean, reference):
         codes = np.unique(groups, return_inverse=True)[1].ravel()
         counts = np.bincount(codes)
         if counts.max() < 2:
@@ -321,22 +321,23 @@ class PersonalReference:
                 "training set has two performances: give groups to fit, and several performances "
                 "of some people."
             )
-        filled = fill_with_mean(kept, mean)
-        self._mean, self._weights = mean, learn_weights(filled, codes, own=True)
-        self._within = within_variance(kept, codes).mean(axis=0)
+        filled = fill_with_mean(training, mean)
+        self._mean, self._weights = mean, learn_weights(filled, codes, within_groups=True)
+        self._within = within_variance(training, codes).mean(axis=0)
         sums, sizes = sums_of_groups(filled, codes)
         of_means = (sums / sizes).var(axis=0, ddof=1).mean(axis=0)
         self._between = np.maximum(of_means - self._within * (1 / counts).mean(), 0)
-        self._neighbours = self._near(own, mean)
+        self._neighbours = self._near(reference, mean)
         of_others = mean_of_others(filled, codes)
-        self.held_out = np.full(len(kept), np.nan)
+        self.held_out = np.full(len(training), np.nan)
         for i, code in enumerate(codes):
             same = np.flatnonzero(codes == code)
             # The next ones, the first after the last.
-            others = np.roll(same, -1 - np.searchsorted(same, i))[: min(len(own), len(same) - 1)]
+            count = min(len(reference), len(same) - 1)
+            others = np.roll(same, -1 - np.searchsorted(same, i))[:count]
             if len(others):
-                near = self._near(kept[others], of_others[i])
-                self.held_out[i] = near.dissimilarity(kept[[i]])[0]
+                near = self._near(training[others], of_others[i])
+                self.held_out[i] = near.dissimilarity(training[[i]])[0]
         self.moments = log_moments(self.held_out[np.isfinite(self.held_out)])
 
     def dissimilarity(self, performances):
@@ -347,12 +348,12 @@ class PersonalReference:
         """Largest dissimilarity that a share of the person's performances is expected to have."""
         return self._neighbours.limit(self.moments, coverage)
 
-    def _near(self, own, mean):
+    def _near(self, reference, mean):
         """Neighbours of performances of one person, moved towards the mean of other people."""
-        own = fill_with_mean(own, self._mean)
-        ratio = self._between / (self._between + self._within / len(own))
-        moved = own + (ratio - 1) * (own.mean(axis=0) - mean)
-        one = np.zeros(len(own), dtype=np.intp)
+        reference = fill_with_mean(reference, self._mean)
+        ratio = self._between / (self._between + self._within / len(reference))
+        moved = reference + (ratio - 1) * (reference.mean(axis=0) - mean)
+        one = np.zeros(len(reference), dtype=np.intp)
         return Neighbours(moved, one, mean=self._mean, weights=self._weights)
 
 
@@ -402,13 +403,13 @@ def _energies_of_seen(on_clock):
     means = values.sum(axis=1) / np.maximum(counts, 1)
     squares = np.where(seen, np.square(values - means[:, np.newaxis]), 0).sum(axis=1)
     shown = counts > 0
-    own = np.where(shown, squares / np.maximum(counts, 1), 0)
-    usual = own.sum(axis=0) / np.maximum(shown.sum(axis=0), 1)
+    of_features = np.where(shown, squares / np.maximum(counts, 1), 0)
+    usual = of_features.sum(axis=0) / np.maximum(shown.sum(axis=0), 1)
     share = np.where(shown, usual, 0).sum(axis=1) / (usual.sum() or 1.0)
     centre = values.sum(axis=(0, 1)) / np.maximum(counts.sum(axis=0), 1)
     apart = np.where(seen, np.square(values - centre), 0).sum(axis=(0, 1))
     variance = (apart / np.maximum(counts.sum(axis=0), 1)).sum()
-    return own.sum(axis=1) / np.where(share > 0, share, 1), variance
+    return of_features.sum(axis=1) / np.where(share > 0, share, 1), variance
 
 
 # -- performances that come one after the other: moments of all, and a sample of them --------

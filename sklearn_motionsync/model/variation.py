@@ -299,9 +299,9 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state):
     """
     spread = deviations.std(axis=0)
     shapes = (deviations - deviations.mean(axis=0)) / np.where(spread > 0, spread, 1)
-    own = random_state.randint(len(shapes), size=n)
+    chosen = random_state.randint(len(shapes), size=n)
     one, mixed, noise = _POSTURE
-    z = _mixtures(own, len(shapes), one, mixed, random_state) @ shapes
+    z = _mixtures(chosen, len(shapes), one, mixed, random_state) @ shapes
     z += np.sqrt(noise) * random_state.standard_normal(z.shape)
     std = np.sqrt(variance)
     lower, upper = mean - n_std * std, mean + n_std * std
@@ -342,8 +342,8 @@ def sample_performances(mean, variance, deviations, n, dissimilarity, threshold,
     of_known = dissimilarity(space.performances(known))
     inside = np.flatnonzero(of_known <= threshold)
     centers = inside if len(inside) else np.array([first_smallest(of_known)])
-    own = centers[random_state.randint(len(centers), size=n)]
-    weights = _mixtures(own, len(known), *_PERFORMANCE, random_state)
+    chosen = centers[random_state.randint(len(centers), size=n)]
+    weights = _mixtures(chosen, len(known), *_PERFORMANCE, random_state)
     drawn = np.tensordot(weights, known - known.mean(axis=0), axes=1)
     drawn *= _scale(variance, deviations)
     samples = space.performances(drawn)
@@ -353,15 +353,15 @@ def sample_performances(mean, variance, deviations, n, dissimilarity, threshold,
         if not len(outside):
             break
         share = step / _STEPS
-        coordinates = (1 - share) * drawn[outside] + share * known[own[outside]]
+        coordinates = (1 - share) * drawn[outside] + share * known[chosen[outside]]
         samples[outside] = space.performances(coordinates)
     return samples
 
 
-def _mixtures(own, n_kept, one, mixed, random_state):
+def _mixtures(chosen, n_kept, one, mixed, random_state):
     """Weights (n, n_kept) of mixtures: shares of the variance of one performance, and of all."""
-    weights = random_state.standard_normal((len(own), n_kept)) * np.sqrt(mixed / n_kept)
-    weights[np.arange(len(own)), own] += np.sqrt(one)
+    weights = random_state.standard_normal((len(chosen), n_kept)) * np.sqrt(mixed / n_kept)
+    weights[np.arange(len(chosen)), chosen] += np.sqrt(one)
     return weights
 
 
@@ -374,8 +374,8 @@ def _truncate(z, n_std):
 
 def _scale(variance, deviations):
     """The factor that gives mixtures of the kept deviations the variance of all: 0.5 to 2."""
-    kept = deviations.var(axis=0)
-    ratio = np.divide(variance, kept, out=np.ones_like(kept), where=kept > 0)
+    of_kept = deviations.var(axis=0)
+    ratio = np.divide(variance, of_kept, out=np.ones_like(of_kept), where=of_kept > 0)
     return np.clip(np.sqrt(ratio), 0.5, 2)
 
 
@@ -416,12 +416,12 @@ class TangentSpace:
 
     def performances(self, coordinates):
         """Performances (m, P, n_features) of coordinates: their directions have the length 1."""
-        found = self.mean + coordinates
+        out = self.mean + coordinates
         for columns, base in zip(self.directions, self._bases, strict=True):
             tangents = coordinates[..., columns]
             tangents = tangents - (tangents * base).sum(axis=-1, keepdims=True) * base
-            found[..., columns] = exp_map(base, tangents)
-        return found.astype(self.mean.dtype)
+            out[..., columns] = exp_map(base, tangents)
+        return out.astype(self.mean.dtype)
 
 
 def directions_in(performances):
@@ -435,16 +435,16 @@ def directions_in(performances):
     -------
     list of slice
     """
-    found, start = [], 0
+    directions, start = [], 0
     squares = np.square(performances.astype(np.float64))
     while start < squares.shape[2]:
         for width in (3, 2):
             columns = slice(start, start + width)
             if columns.stop <= squares.shape[2] and _are_one(squares[..., columns]):
-                found.append(columns)
+                directions.append(columns)
                 break
-        start = found[-1].stop if found and found[-1].start == start else start + 1
-    return found
+        start = directions[-1].stop if directions and directions[-1].start == start else start + 1
+    return directions
 
 
 def _are_one(squares):

@@ -358,8 +358,8 @@ class KernelRegression:
 def _inverse_root(kernel, least):
     """The inverse square root (n, n_kept) of a kernel (n, n), without its smallest eigenvalues."""
     values, vectors = eigh(kernel)
-    kept = values > least * max(values[-1], 0)
-    return vectors[:, kept] / np.sqrt(values[kept])
+    is_large = values > least * max(values[-1], 0)
+    return vectors[:, is_large] / np.sqrt(values[is_large])
 
 
 def decision_values(kernel, A, b):
@@ -390,12 +390,12 @@ def held_out_decisions(regression, kernel, codes, folds):
     NaN where these have fewer than two classes, or no landmark, and minus infinity for classes they
     do not have.
     """
-    found = np.full((len(codes), codes.max() + 1), np.nan)
+    decisions = np.full((len(codes), codes.max() + 1), np.nan)
     for fold in np.unique(folds):
         out = folds == fold
         if len(np.unique(codes[~out])) > 1 and (~out)[regression.landmarks].any():
-            found[out] = decision_values(kernel[out], *regression.fit(codes, ~out))
-    return found
+            decisions[out] = decision_values(kernel[out], *regression.fit(codes, ~out))
+    return decisions
 
 
 def fit_temperature(decisions, codes):
@@ -416,11 +416,11 @@ def fit_temperature(decisions, codes):
 
     def loss(log_ratio):
         logs = log_softmax(_PRIOR_TEMPERATURE * np.exp(log_ratio) * decisions, axis=1)
-        own = logs[np.arange(len(codes)), codes]
-        return (log_ratio / _PRIOR_STD) ** 2 / 2 - own.sum()
+        of_class = logs[np.arange(len(codes)), codes]
+        return (log_ratio / _PRIOR_STD) ** 2 / 2 - of_class.sum()
 
-    found = minimize_scalar(loss, bounds=(-5, 5), method="bounded", options={"xatol": 1e-6})
-    return float(_PRIOR_TEMPERATURE * np.exp(found.x))
+    best = minimize_scalar(loss, bounds=(-5, 5), method="bounded", options={"xatol": 1e-6})
+    return float(_PRIOR_TEMPERATURE * np.exp(best.x))
 
 
 def fold_gain(regression, kernel, codes, folds, decisions):
