@@ -197,7 +197,7 @@ def test_published_simulations(name, what, real_data):
     table = np.loadtxt(real_data / "nlreg1d" / f"{name}.csv", delimiter=",")
     X, groups = list(table[:, 1:, np.newaxis]), table[:, 0].astype(int)
     sync = DenseSynchronizer(101).fit(X)
-    found = compare_groups(sync, X, groups, n_permutations=999)
+    found = compare_groups(sync, X, groups, n_permutations=499)
     assert found.p_joint < 0.02
     assert set(found.clusters["what"]) == {what}
 
@@ -438,6 +438,7 @@ def test_too_few_people_are_told_so():
         X = [curve[:, np.newaxis] for curve in curves]
         sync = LinearSynchronizer(50).fit(X)
         people = np.repeat(np.arange(n), 2)
-        found = compare_groups(sync, X, ["a", "b"] * n, people=people, paired=True)
+        given = {"people": people, "paired": True, "n_permutations": 199}
+        found = compare_groups(sync, X, ["a", "b"] * n, **given)
         assert f": {words}" in found.describe()
         assert found.smallest_p == 2 / 2**n

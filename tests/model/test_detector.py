@@ -102,8 +102,7 @@ def slow_reversal(X, groups, new):
     return [1 - project(x - x[::-1], np.mean(d, axis=0)) / middle for x in new]
 
 
-@pytest.mark.parametrize(("duration", "n_tests"), [(True, 4), (False, 3)])
-@pytest.mark.parametrize("grouped", [True, False])
+@pytest.mark.parametrize(("duration", "n_tests", "grouped"), [(True, 4, True), (False, 3, False)])
 def test_report_equals_slow_loops(duration, n_tests, grouped):
     groups = GROUPS if grouped else None
     codes = GROUPS if grouped else np.arange(len(X))
@@ -237,12 +236,17 @@ def nestings(synchronizer):
     }
 
 
+@pytest.fixture(scope="module")
+def flat_report():
+    pipe = nestings(DenseSynchronizer(20))["flat"]
+    return ActionDetector(pipe).fit(BUNCH.data, groups=ACTORS).report(BUNCH.data)
+
+
 @pytest.mark.parametrize(
     ("name", "routed"), [*((name, False) for name in nestings(None)), ("across", True)]
 )
-def test_pipelines_of_any_depth(name, routed):
-    pipes = nestings(DenseSynchronizer(20))
-    expected = ActionDetector(pipes["flat"]).fit(BUNCH.data, groups=ACTORS).report(BUNCH.data)
+def test_pipelines_of_any_depth(name, routed, flat_report):
+    pipes, expected = nestings(DenseSynchronizer(20)), flat_report
     with config_context(enable_metadata_routing=routed):
         found = ActionDetector(pipes[name]).fit(BUNCH.data, groups=ACTORS)
         report = found.report(BUNCH.data)

@@ -125,9 +125,9 @@ def slow_kernel(X, new, gamma, weights):
     return sum(weight * view for weight, view in zip(weights, views, strict=True))
 
 
-@pytest.mark.parametrize("gamma", [1, 0.3])
-def test_decisions_equal_those_of_slow_kernels(known, new, gamma):
+def test_decisions_equal_those_of_slow_kernels(known, new):
     X, y, people = known
+    gamma = 0.3
     codes = np.unique(y, return_inverse=True)[1]
     classifier = ActionClassifier(n_frames=30, gamma=gamma, C=3).fit(X, y, groups=people)
     weights = classifier.weights_
@@ -417,15 +417,6 @@ def test_constant_features_have_no_weight(known, fitted, new, constant):
     classifier = ActionClassifier(n_frames=30).fit(wider(X), y, groups=people)
     found = classifier.decision_function(wider(new[0]))
     np.testing.assert_allclose(found, fitted.decision_function(new[0]), atol=1e-3)
-
-
-def test_any_costs_separate_the_classes(known, new):
-    X, y, _ = known
-    for costs in ("elastic", ("posture", "velocity"), np.array(["velocity"]), []):
-        classifier = ActionClassifier(costs, n_frames=15).fit(X, y)
-        assert classifier.score(new[0], new[1]) > 0.8
-    bare = ActionClassifier(["elastic"], summaries=False, n_frames=15).fit(X, y)
-    assert bare.score(new[0], new[1]) > 0.8
 
 
 @pytest.mark.parametrize(
