@@ -21,14 +21,6 @@ def model(performances):
     return ActionModel().fit(performances)
 
 
-def test_mean_and_variance(model, performances):
-    np.testing.assert_allclose(model.mean_, performances.mean(axis=0))
-    np.testing.assert_allclose(model.variance_, performances.var(axis=0))
-    lower, upper = model.envelope()
-    np.testing.assert_allclose(upper - lower, 6 * performances.std(axis=0))
-    np.testing.assert_allclose((upper + lower) / 2, model.mean_)
-
-
 def test_density_equals_that_of_normal_distributions(model, performances):
     expected = norm(performances.mean(axis=0), performances.std(axis=0)).logpdf(performances)
     np.testing.assert_allclose(model.score_samples(performances), expected.sum(axis=(1, 2)))

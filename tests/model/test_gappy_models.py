@@ -6,7 +6,6 @@ import pytest
 from scipy import stats
 from sklearn import clone
 from sklearn.exceptions import NotFittedError
-from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -244,12 +243,6 @@ def test_portions_give_the_same_to_the_last_bit(gaps):
     for name in ("mean_", "variance_", "predictive_variance_", "missing_", "deviations_"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
     np.testing.assert_allclose(parts.threshold_, whole.threshold_, rtol=1e-12)
-
-
-def test_a_search_in_a_pipeline_of_one_step(gaps):
-    pipe = make_pipeline(ActionModel())
-    search = GridSearchCV(pipe, {"actionmodel__n_std": [2, 3]}, cv=3, error_score="raise").fit(gaps)
-    assert np.isfinite(search.best_score_)
 
 
 # -- what is refused ----------------------------------------------------------------------

@@ -29,22 +29,6 @@ def expected():
     return found
 
 
-def test_groups_change_the_threshold(expected):
-    assert make().fit(BUNCH.data)[-1].threshold_ != expected[-1]
-
-
-def test_without_routing_groups_are_fit_parameters(expected):
-    given = {"actionmodel__groups": GROUPS}
-    found = cross_validate(
-        make(), BUNCH.data, groups=GROUPS, cv=CV, params=given, return_estimator=True
-    )
-    assert [pipe[-1].threshold_ for pipe in found["estimator"]] == expected[:3]
-    search = GridSearchCV(make(), {"actionmodel__coverage": [0.9, 0.95]}, cv=CV)
-    search.fit(BUNCH.data, groups=GROUPS, **given)
-    best = search.best_params_["actionmodel__coverage"]
-    assert (search.best_estimator_[-1].threshold_ == expected[-1]) is (best == 0.95)
-
-
 def test_groups_are_routed(expected):
     with config_context(enable_metadata_routing=True):
         pipe = make(ActionModel().set_fit_request(groups=True))
