@@ -1,5 +1,8 @@
 """Matplotlib's ``plot`` directive in Markdown pages.
 
+Where the gallery is not run (``-D plot_gallery=0``), the code of a page is not run either: it is
+shown without its figure.
+
 The directive hands its result to the parser as reStructuredText lines, which the parser of Markdown
 cannot take; here they are parsed apart.
 """
@@ -20,12 +23,16 @@ class _Machine:
 
 
 def _directive():
+    from docutils import nodes
     from matplotlib.sphinxext import plot_directive
     from myst_parser.mocking import MockRSTParser
     from sphinx.util.docutils import new_document
 
     class Plot(plot_directive.PlotDirective):
         def run(self):
+            if self.state.document.settings.env.config.plot_gallery == "0":
+                code = "\n".join(self.content)
+                return [nodes.literal_block(code, code, language="python")]
             if not hasattr(self.state, "_renderer"):
                 return super().run()
             outer = self.state.document
