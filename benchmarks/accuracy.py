@@ -5,8 +5,8 @@
 
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form. *People*
 has the key moments of harness.py in three ways: of people held out, of all ordered pairs, and on
-one common time line of a fit with the median template. ``--peers`` puts the sets on a common time
-line with other packages, too: they are fed postures and velocities (smoothed over 3 % of the clip),
+one common time line of a fit with the median pattern. ``--peers`` puts the sets on a common time
+line with other packages, too: they are fed poses and velocities (smoothed over 3 % of the clip),
 and every setting is shown, where ours have one for all. Prints Markdown.
 """
 
@@ -56,7 +56,7 @@ OURS = {
     PLAIN: lambda **kw: DenseSynchronizer(P, metric=None, **kw),
     "`consensus=0`": lambda **kw: DenseSynchronizer(P, consensus=0, **kw),
     '`cost="elastic"`': lambda **kw: DenseSynchronizer(P, cost="elastic", **kw),
-    '`cost="posture"`': lambda **kw: DenseSynchronizer(P, cost="posture", **kw),
+    '`cost="pose"`': lambda **kw: DenseSynchronizer(P, cost="pose", **kw),
     "`refine=True` (single source)": lambda **kw: DenseSynchronizer(P, refine=True, **kw),
 }
 UNREFINED = {"`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw)}
@@ -191,8 +191,8 @@ def bending_table(folder):
     rows = {name: [] for name in makers}
     for seed in range(4):
         bunch = make_bending(random_state=seed)
-        postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-        X, lengths = ASpace().fit_transform(postures), [len(x) for x in bunch.data]
+        poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+        X, lengths = ASpace().fit_transform(poses), [len(x) for x in bunch.data]
         for name, make in makers.items():
             known = {"keyframes": bunch.keyframes} if name == given else {}
             sync = make().fit(X, **known)

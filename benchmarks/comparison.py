@@ -4,7 +4,7 @@
     python benchmarks/comparison.py DATA_FOLDER [level] [power] [peers] [nlreg1d] [--studies N]
 
 *Level*: studies in which nothing differs, of 8 to 30 people of `make_gait` with two strides, one to
-four signals, groups, pairs or a covariate drawn at random, and templates of group A alone; and of
+four signals, groups, pairs or a covariate drawn at random, and patterns of group A alone; and of
 people drawn from the forces of a muscle (nlreg1d), in groups at random. Signals are scaled for the
 match and compared in their units, by 199 permutations at 5 %. *Power*: differences that `make_gait`
 makes between 10 or 20 people of two strides, four signals, by 399 permutations. In per cent.
@@ -85,10 +85,10 @@ def null_study(seed):
     one = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P))
     one.fit([x for x, group in zip(data, gait.group, strict=True) if group == "A"])
     rows = []
-    for kind in ("two", "three", "paired", "covariate", "within", "template of A"):
-        design = compared(gait, "two" if kind == "template of A" else kind, rng)
+    for kind in ("two", "three", "paired", "covariate", "within", "pattern of A"):
+        design = compared(gait, "two" if kind == "pattern of A" else kind, rng)
         design |= {"people": gait.person, "n_permutations": 199, "random_state": seed}
-        found = compare_groups(one if kind == "template of A" else pipe, data, **design)
+        found = compare_groups(one if kind == "pattern of A" else pipe, data, **design)
         rows.append(found.to_frame()["differs"].tolist())
     return rows
 
@@ -230,8 +230,8 @@ def srsf(y):
     with contextlib.redirect_stdout(io.StringIO()):
         registration = fdasrsf.fdawarp(y.T, clock)
         registration.srsf_align(MaxItr=5, verbose=False)
-    # A frame of the template is at gam(t) of the curve. The displacement tells, at the frames of
-    # the curve, how much later they are than in the template.
+    # A frame of the pattern is at gam(t) of the curve. The displacement tells, at the frames of
+    # the curve, how much later they are than in the pattern.
     displacement = np.stack([clock - np.interp(clock, g, clock) for g in registration.gam.T])
     return registration.fn.T[:, 1:-1], displacement[:, 1:-1]
 
@@ -286,7 +286,7 @@ def fdatools_registered(trials, groups, people):
     coefs = fds[0].coefs if len(fds) == 1 else np.stack([fd.coefs for fd in fds], axis=2)
     options = {"criterion": "least_squares", "warp_basis": warps, "lam": 1e-4}
     result = fdatools.register(fdatools.FData(coefs, basis), max_iter=30, tol=1e-6, **options)
-    # A frame of the template is at warp(t) of the curve.
+    # A frame of the pattern is at warp(t) of the curve.
     moments = np.asarray(result.warp_values(CLOCK)).T
     curves = [
         np.stack([np.interp(at, CLOCK, x) for at, x in zip(moments, own, strict=True)])
@@ -327,7 +327,7 @@ def peer_study(seed, difference, signals, name):
 def level_table(folder, n_studies=1000):
     """How often each answer is given where nothing differs."""
     kinds = ["two groups", "three groups", "paired", "covariate", "covariate within people"]
-    kinds.append("two groups, template of A alone")
+    kinds.append("two groups, pattern of A alone")
     table = np.loadtxt(folder / "nlreg1d" / "Besier2009-vastus.csv", delimiter=",")
     print_head(f"nothing differs, {n_studies} studies", ANSWERS)
     for prefix, names, function in (

@@ -5,15 +5,15 @@
 `CONSTANTS` lists what the defaults of `DenseSynchronizer` rest on. Prints by how many per cent the
 error grows, in the geometric mean over moments, joints or sets:
 
-- pairs: key moments of the people on whom the defaults were chosen, from templates to trials;
+- pairs: key moments of the people on whom the defaults were chosen, from patterns to trials;
 - one clock: the same moments, from any trial to any other over the clock of one fit;
 - unseen: moments of other actions over one clock (events44), on which nothing was chosen;
-- forces: the spread that is left of landmarks of single curves (nlreg1d), by two templates a set;
+- forces: the spread that is left of landmarks of single curves (nlreg1d), by two patterns a set;
 - warps: how far known warps are missed, with noise of 0.5, 5 and 20 % and 16, 2 and 1 signals.
 
 The worth of a constant is its largest change of all; those of less than 1 % could as well have
 another value, or go. "No effect" are those that nothing here depends on, to the last bit. To be
-quick every column but the second is thinned: two templates, and every second trial, an action;
+quick every column but the second is thinned: two patterns, and every second trial, an action;
 every second unseen action; two random sets. So a change of pairs, of unseen moments or of warps by
 2 % may be chance. Takes five minutes on two free cores. Prints Markdown.
 """
@@ -200,30 +200,30 @@ NOISE, SIGNALS = (0.005, 0.05, 0.2), (16, 2, 1)
 RATES = (0.5, 2.0), (0.75, 1.35)
 
 
-def templates_of(one):
-    """Two templates of an action that show all of its moments."""
+def patterns_of(one):
+    """Two patterns of an action that show all of its moments."""
     shown = np.isfinite([at[one.patterns] for at in one.moments.values()]).all(axis=0)
     able = one.patterns[shown]
     return able[[len(able) // 3, 2 * len(able) // 3]]
 
 
-def errors_of_pairs(one, template, others):
-    """Errors of the moments of an action, from a template to other trials."""
-    sync = DenseSynchronizer(P, pattern=int(template)).fit(one.X)
-    others = others[others != template]
+def errors_of_pairs(one, pattern, others):
+    """Errors of the moments of an action, from a pattern to other trials."""
+    sync = DenseSynchronizer(P, pattern=int(pattern)).fit(one.X)
+    others = others[others != pattern]
     times = sync.match([one.X[i] for i in others]).times
     for event, at in one.moments.items():
-        landed = np.array([np.interp(at[template], np.arange(P), tau) for tau in times])
+        landed = np.array([np.interp(at[pattern], np.arange(P), tau) for tau in times])
         yield event, np.abs(landed - at[others])
 
 
 def pairs(people):
-    """Mean errors of moments from templates to trials."""
+    """Mean errors of moments from patterns to trials."""
     errors: dict = {}
     for one in people:
         others = np.arange(0, len(one.X), 2)
-        for template in templates_of(one):
-            for event, misses in errors_of_pairs(one, template, others):
+        for pattern in patterns_of(one):
+            for event, misses in errors_of_pairs(one, pattern, others):
                 errors.setdefault((one.name, event), []).extend(misses[np.isfinite(misses)])
     return {event: np.mean(misses) for event, misses in errors.items()}
 
@@ -269,11 +269,11 @@ def read_landmarks(folder):
 
 
 def forces(sets):
-    """Standard deviations of landmarks on the clocks of two templates, in the mean."""
+    """Standard deviations of landmarks on the clocks of two patterns, in the mean."""
     spread = {}
     for name, curves, moments in sets:
-        templates = 2 * len(curves) // 5, 3 * len(curves) // 5
-        syncs = [DenseSynchronizer(P, pattern=n).fit(curves) for n in templates]
+        patterns = 2 * len(curves) // 5, 3 * len(curves) // 5
+        syncs = [DenseSynchronizer(P, pattern=n).fit(curves) for n in patterns]
         warps = [sync.match(curves).times for sync in syncs]
         for landmark, at in moments.items():
             spread[name, landmark] = np.mean([on_time_line(times, at)[1] for times in warps])

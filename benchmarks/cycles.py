@@ -15,7 +15,7 @@ that are warned of are false alarms.
 
 *Standing*: walks and jogs have so many times as much standing around them, half of it before, half
 behind. ``freeze`` repeats the first and the last frame. ``sway`` turns within half a second to a
-posture of standing and back, and sways by 1 cm, below about 1 Hz, with 1 mm of noise. ``noise`` has
+pose of standing and back, and sways by 1 cm, below about 1 Hz, with 1 mm of noise. ``noise`` has
 1 cm of white noise in all joints as well. A cycle is inside if it begins and ends within the walk;
 a cut is inside alike. *Joined* are single actions, with a jog in the middle. A *gesture* in a long
 take is found if more than half of a stretch lies within its label. Prints Markdown.
@@ -30,7 +30,7 @@ from harness import command_line, print_head, print_row, run_tables
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn_motionsync import CycleSegmenter
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 
 CYCLIC = {"cmu07_walk": "walk", "hdm05": "jogLeftCircle4StepsRstart"}
 SINGLE = {
@@ -48,7 +48,7 @@ SMOOTHING, APART = 0.02, 0.3
 # Of so many repetitions in a chain every so many is one done wrong; 0 is none.
 CHAIN, EVERY, DRAWS = 12, (0, 2, 4), 3
 GESTURES = ("waveHands", "clapHands")
-# Seconds of the turn to a posture of standing, and of the filter of the sway; sway and noise in m.
+# Seconds of the turn to a pose of standing, and of the filter of the sway; sway and noise in m.
 TURN, SLOW, SWAY, NOISE = 0.5, 0.25, 0.01, 0.001
 
 
@@ -68,7 +68,7 @@ def read(folder, archive, label):
 
 @functools.cache
 def _load(path):
-    return load_performances(path)
+    return load_trials(path)
 
 
 def foot_strikes(positions, skeleton, frame_rate):
@@ -153,7 +153,7 @@ def warnings_of(folder):
 
 
 def turned(pose, other, skeleton):
-    """A posture, turned and shifted so that its pelvis and hips are those of another."""
+    """A pose, turned and shifted so that its pelvis and hips are those of another."""
     hips = [skeleton.index_of(f"{side}_hip") for side in ("left", "right")]
     pelvis = skeleton.index_of("pelvis")
     across = [x[hips[0]] - x[hips[1]] for x in (pose, other)]
@@ -164,7 +164,7 @@ def turned(pose, other, skeleton):
 
 
 def blended(start, end, n):
-    """Postures from one to another, the first excluded, at rest at both."""
+    """Poses from one to another, the first excluded, at rest at both."""
     share = np.minimum(np.arange(1, n + 1) / n, 1)[:, np.newaxis, np.newaxis]
     return start + share**2 * (3 - 2 * share) * (end - start)
 
@@ -194,7 +194,7 @@ def with_standing(walk, factor, kind, rng):
 
 
 def walks(folder):
-    """Walks and jogs, each with a posture of standing, and the unit of a metre."""
+    """Walks and jogs, each with a pose of standing, and the unit of a metre."""
     for archive, label in CYCLIC.items():
         bunch = read(folder, archive, label)
         poses = {}
@@ -307,7 +307,7 @@ def among_actions(folder, n_actions, draws=24, jogs=False):
 def gestures(folder):
     """Of clips of a gesture, how many are cyclic; of its labels in takes, how many are found."""
     file = np.load(f"{folder}/utkinect/utkinect_takes.npz")
-    bunch = load_performances(f"{folder}/utkinect/utkinect_takes.npz")
+    bunch = load_trials(f"{folder}/utkinect/utkinect_takes.npz")
     stretches = CycleSegmenter(bunch.skeleton).report(bunch.data)["stretches"].tolist()
     labels = [file[f"segment_{name}"].tolist() for name in ("take", "label", "start", "stop")]
     found, n_labels, right = {}, {}, set()

@@ -31,7 +31,7 @@ from sklearn_motionsync import (
     Skeleton,
     find_departures,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 
 P = 60
 BODY = Skeleton.paper()
@@ -158,7 +158,7 @@ class Trials(NamedTuple):
 
 
 def classes_of_hdm05(folder):
-    bunch = load_performances(Path(folder) / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(Path(folder) / "hdm05" / "hdm05_positions.npz")
     data = as_bodies(bunch.data, bunch.skeleton)
     for name in np.unique(bunch.target):
         rows = np.flatnonzero(bunch.target == name)
@@ -229,8 +229,8 @@ def departures_of(fold, pipe, reference, limit=0.1):
     trials = [fault.trial for _, fault in pairs]
     given = {"reference": reference} if reference else {}
     tables = [find_departures(pipe, X, limit=limit, **given) for X in (trials, fold.tested)]
-    firsts = tables[0].groupby("performance").head(1).set_index("performance")
-    rare = [set(table.loc[table["rare"], "performance"]) for table in tables]
+    firsts = tables[0].groupby("trial").head(1).set_index("trial")
+    rare = [set(table.loc[table["rare"], "trial"]) for table in tables]
     times = Match.from_estimator(pipe, trials).times / (P - 1)
     said = [Said("untouched", None, rare=i in rare[1]) for i in range(len(fold.tested))]
     for i, (name, fault) in enumerate(pairs):

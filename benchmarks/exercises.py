@@ -30,7 +30,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.body.limbs import PARTS
 from sklearn_motionsync.body.mirror import exchange_of_sides
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 
 from model import BACKWARDS, SPOILT, as_clips
 
@@ -75,7 +75,7 @@ def read_positions(folder):
 
 
 def read_exercises(folder):
-    """Name, postures, people, whether it is right, and number of the trial, of each exercise."""
+    """Name, poses, people, whether it is right, and number of the trial, of each exercise."""
     trials, table, skeleton = read_positions(folder)
     trials = DirectionCosines(skeleton).fit_transform(trials)
     for name, rows in table.groupby("label"):
@@ -181,7 +181,7 @@ def wrong_sides(clips, names):
 
 def sides(folder):
     for archive, name in (("hdm05", "HDM05"), ("utkinect", "UTKinect")):
-        bunch = load_performances(folder / archive / f"{archive}_positions.npz")
+        bunch = load_trials(folder / archive / f"{archive}_positions.npz")
         names = DirectionCosines(bunch.skeleton).fit(bunch.data).get_feature_names_out()
         wrong_sides(as_clips(name, bunch), names)
 

@@ -88,8 +88,8 @@ def linear(curves):
 
 def dense(**params):
     def times(curves):
-        performances = list(curves[:, :, np.newaxis] if curves.ndim == 2 else curves)
-        return DenseSynchronizer(**params).fit(performances).match(performances).times
+        trials = list(curves[:, :, np.newaxis] if curves.ndim == 2 else curves)
+        return DenseSynchronizer(**params).fit(trials).match(trials).times
 
     return times
 
@@ -117,7 +117,7 @@ def elastic(curves):
 
 METHODS = {
     "linear time normalisation": linear,
-    "the paper's method": dense(cost="posture", metric=None, consensus=0, max_rate=2),
+    "the paper's method": dense(cost="pose", metric=None, consensus=0, max_rate=2),
     "`DenseSynchronizer()`": dense(),
     '`DenseSynchronizer(cost="elastic")`': dense(cost="elastic"),
     "`fdatools.register`, 8 functions, 1e-3": continuous,

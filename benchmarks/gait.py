@@ -22,7 +22,7 @@ from harness import command_line, print_head, print_row, run_tables
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn_motionsync import Skeleton, gait_events
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.gait.recordings import joints_of_feet
 from sklearn_motionsync.io import read_motion
 
@@ -112,7 +112,7 @@ def name_of(setting):
 
 def people(folder):
     for archive, (label, metres) in PEOPLE.items():
-        bunch = load_performances(folder / archive / f"{archive}_positions.npz")
+        bunch = load_trials(folder / archive / f"{archive}_positions.npz")
         chosen = np.flatnonzero(bunch.target == label)
         of_settings = {}
         for k in chosen:
@@ -163,7 +163,7 @@ def labelled(files):
 
 def refused(folder, every=1):
     """People that stand, and exercises on the spot: sit to stand, shoulders up and turned."""
-    bunch = load_performances(folder / "uiprmd" / "uiprmd_odd_positions.npz")
+    bunch = load_trials(folder / "uiprmd" / "uiprmd_odd_positions.npz")
     skeleton = Skeleton(bunch.joints, bunch.skeleton.parents, LANDMARKS, up="z")
     rng = np.random.default_rng(0)
     counts = {"standing": []} | {name: [] for name in np.unique(bunch.target)}

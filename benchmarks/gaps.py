@@ -147,7 +147,7 @@ def compare(people, actions, kind, seed, ways=WAYS):
 def main():
     parser = command_line(__doc__)
     parser.add_argument("--draws", type=int, default=1, help="of the gaps")
-    parser.add_argument("--patterns", type=int, default=4, help="templates of an action")
+    parser.add_argument("--patterns", type=int, default=4, help="patterns of an action")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     actions = read_actions(options.folder, JUDGED)

@@ -8,7 +8,7 @@ peaks or a clip cut short would measure the event, not the method. `read_actions
 `People` are the clips of an action, matched to a dozen of them at most: by synchronizers that have
 learnt from all clips (`to_patterns`), and by such that know nothing of the people whose clips they
 match (`to_strangers`). `on_time_line` judges what a user does: all clips are warped to one
-template, and compared on its time line. Errors are in frames of 100.
+pattern, and compared on its time line. Errors are in frames of 100.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn.model_selection import GroupKFold
 from sklearn_motionsync import ASpace, DirectionCosines
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from threadpoolctl import threadpool_limits
 
 P = 100
@@ -239,7 +239,7 @@ def read_actions(folder, events=EVENTS):
 
 def read_archive(folder, archive):
     """The clips of an archive that have eight frames at least; takes of walking cut into cycles."""
-    bunch = load_performances(Path(folder) / archive / f"{archive}_positions.npz")
+    bunch = load_trials(Path(folder) / archive / f"{archive}_positions.npz")
     if archive == "cmu07_walk":
         bunch = _cut_into_cycles(bunch, _joints_of_parts(bunch, archive))
     chosen = [i for i, x in enumerate(bunch.data) if len(x) >= LEAST_LENGTH]
@@ -284,13 +284,13 @@ FLOOR = 0.05
 
 
 class People:
-    """The clips of an action as postures and points of their aSpace, and who performs them."""
+    """The clips of an action as poses and points of their aSpace, and who performs them."""
 
     def __init__(self, action, patterns=PATTERNS):
         self.name, self.archive, self.moments = action.name, action.archive, action.moments
         self.actors = action.actors
-        self.postures = DirectionCosines(action.skeleton).fit_transform(action.data)
-        self.X = ASpace().fit_transform(self.postures)
+        self.poses = DirectionCosines(action.skeleton).fit_transform(action.data)
+        self.X = ASpace().fit_transform(self.poses)
         n = len(self.X)
         self.patterns = np.unique(np.linspace(0, n - 1, min(n, patterns)).astype(int))
 
@@ -312,8 +312,8 @@ class People:
         """
         folds = GroupKFold(min(FOLDS, len(set(self.actors))))
         for train, test in folds.split(self.X, groups=self.actors):
-            space = ASpace().fit([self.postures[i] for i in train])
-            points = space.transform(self.postures)
+            space = ASpace().fit([self.poses[i] for i in train])
+            points = space.transform(self.poses)
             known, others = [points[i] for i in train], [points[i] for i in test]
             for row, n in enumerate(self.patterns):
                 if n in train:
@@ -360,9 +360,9 @@ class Judged:
 def on_time_line(times, moments):
     """How far a moment of one clip lands from that of another by way of a common time line.
 
-    ``times`` (n_clips, P) are the warps of all clips to one template, ``moments`` (n_clips,) the
+    ``times`` (n_clips, P) are the warps of all clips to one pattern, ``moments`` (n_clips,) the
     frames of a moment, NaN where a clip does not show it. The moment of each clip is taken to the
-    time line of the template, and from there to each other clip. Returns the errors of all ordered
+    time line of the pattern, and from there to each other clip. Returns the errors of all ordered
     pairs, and the standard deviation of the moment on the time line, both in frames.
     """
     seen, frames = np.flatnonzero(np.isfinite(moments)), np.arange(P)

@@ -5,7 +5,7 @@
 FOLDER holds, at any depth, the cut clips of HDM05 (``HDM_<actor>_<action>_<number>_120.amc``) and
 the skeletons of its actors (``HDM_<actor>.asf``), from https://resources.mpi-inf.mpg.de/HDM05/. The
 six actions and four actors of docs/accuracy.md are taken, 132 clips; ``--actions`` and ``--actors``
-choose others. The archive is what `load_performances` describes, and the names of the files, in
+choose others. The archive is what `load_trials` describes, and the names of the files, in
 metres, y upwards, float32; it is a derivative under the licence of HDM05, CC BY-SA 3.0.
 """
 

@@ -3,7 +3,7 @@
     python benchmarks/intervals.py DATA_FOLDER [people] [doubts]
 
 *People*: the key moments of harness.py, on people that had no part in the fit; the moment of the
-template is to lie inside the interval of each clip. *Doubts*: trials that are wrong (repeated, cut
+pattern is to lie inside the interval of each clip. *Doubts*: trials that are wrong (repeated, cut
 off, backwards, held still, of another action) among trials that are right. Prints Markdown.
 """
 
@@ -107,8 +107,8 @@ def doubts(one, others):
     shares, is_weak = {kind: [] for kind in [*WRONG, OTHER]}, []
     folds = GroupKFold(min(4, len(set(one.actors))))
     for train, test in folds.split(one.X, groups=one.actors):
-        space = ASpace().fit([one.postures[i] for i in train])
-        points = space.transform(one.postures)
+        space = ASpace().fit([one.poses[i] for i in train])
+        points = space.transform(one.poses)
         sync = DenseSynchronizer(P).fit([points[i] for i in train])
         is_weak.append(sync.evidence_.weak)
         for kind, change in WRONG.items():
@@ -117,7 +117,7 @@ def doubts(one, others):
         wrong = [
             x
             for other in others
-            for x, a in zip(other.postures, other.actors, strict=True)
+            for x, a in zip(other.poses, other.actors, strict=True)
             if a in people
         ]
         if wrong:

@@ -45,15 +45,15 @@ from sklearn_motionsync import (
     MotionTracker,
     OnlineSynchronizer,
     PartSynchronizer,
-    blend_performances,
+    blend_trials,
     compare_groups,
     compare_to_norm,
     find_departures,
-    find_performances,
+    find_trials,
     synchronization_distances,
     write_report,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.display import SynchronizationDisplay
 from sklearn_motionsync.io import read_motion
 
@@ -96,7 +96,7 @@ def three_actions(n_each, seed):
 
 
 def long_take(n=20_000):
-    """A random walk from 0 to 0 that shows a performance of 100 frames every 1000 frames."""
+    """A random walk from 0 to 0 that shows a trial of 100 frames every 1000 frames."""
     x = np.cumsum(0.1 * np.random.default_rng(0).standard_normal((n, 16)), axis=0)
     x -= np.linspace(0, 1, n)[:, np.newaxis] * x[-1]
     for start in range(500, n - 200, 1000):
@@ -114,7 +114,7 @@ def long_walk(n=5000):
 
 
 class Data:
-    """Performances by their names; each is read, or made, when it is first asked for."""
+    """Trials by their names; each is read, or made, when it is first asked for."""
 
     def __init__(self, folder):
         self.folder = Path(folder)
@@ -122,7 +122,7 @@ class Data:
     @cached_property
     def hdm05(self):
         """The archive of real motion capture."""
-        return load_performances(self.folder / "hdm05" / "hdm05_positions.npz")
+        return load_trials(self.folder / "hdm05" / "hdm05_positions.npz")
 
     def positions(self, action):
         """Joint positions of an action."""
@@ -130,8 +130,8 @@ class Data:
         return [x for x, target in pairs if target == action]
 
     def _points(self, action):
-        postures = DirectionCosines(self.hdm05.skeleton).fit_transform(self.positions(action))
-        points = ASpace(0.95).fit_transform(postures)
+        poses = DirectionCosines(self.hdm05.skeleton).fit_transform(self.positions(action))
+        points = ASpace(0.95).fit_transform(poses)
         return [np.ascontiguousarray(x, dtype=float) for x in points]
 
     @cached_property
@@ -167,8 +167,8 @@ class Data:
     @cached_property
     def simulated_points(self):
         """The same as points of their aSpace."""
-        postures = DirectionCosines(self.simulated.skeleton).fit_transform(self.simulated.data)
-        return [np.ascontiguousarray(x) for x in ASpace(16).fit_transform(postures)]
+        poses = DirectionCosines(self.simulated.skeleton).fit_transform(self.simulated.data)
+        return [np.ascontiguousarray(x) for x in ASpace(16).fit_transform(poses)]
 
     @cached_property
     def copies(self):
@@ -211,7 +211,7 @@ def fit(make, *training):
 
 
 def each(method, X, count=10):
-    """A method of one performance at a time, so many times."""
+    """A method of one trial at a time, so many times."""
 
     def run():
         for i in range(count):
@@ -243,7 +243,7 @@ def online(data):
 
 
 def steps(estimator, frames):
-    """A whole performance, frame by frame."""
+    """A whole trial, frame by frame."""
 
     def run():
         estimator.reset()
@@ -281,12 +281,12 @@ def clf_predict30(data):
 
 def search_sync_20000(data):
     query, take = dense().fit(warped_sines(20)), long_take()
-    return Work(lambda: find_performances(query, take))
+    return Work(lambda: find_trials(query, take))
 
 
 def aspace_fit(data):
-    postures = DirectionCosines(data.hdm05.skeleton).fit_transform(data.hop_positions)
-    return Work(lambda: ASpace(0.95).fit_transform(postures))
+    poses = DirectionCosines(data.hdm05.skeleton).fit_transform(data.hop_positions)
+    return Work(lambda: ASpace(0.95).fit_transform(poses))
 
 
 def read_c3d(data):
@@ -318,7 +318,7 @@ def blend(data):
     bunch = data.simulated
     pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(16), dense()).fit(bunch.data)
     pair = bunch.data[:2]
-    return Work(lambda: blend_performances(pipe, pair, [0.5, 0.5], skeleton=bunch.skeleton))
+    return Work(lambda: blend_trials(pipe, pair, [0.5, 0.5], skeleton=bunch.skeleton))
 
 
 def clone_params(data):

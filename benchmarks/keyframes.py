@@ -32,26 +32,26 @@ def own_frames(at, X):
     return (np.asarray(at) / (P - 1) * (np.array([len(x) for x in X]) - 1))[:, np.newaxis]
 
 
-# -- the methods: warps of some clips to a template, after a fit to others ----------------------
+# -- the methods: warps of some clips to a pattern, after a fit to others ----------------------
 
 
-def nothing(X, at, template, others, of_others):
-    return DenseSynchronizer(P, pattern=template).fit(X).match(others).times
+def nothing(X, at, pattern, others, of_others):
+    return DenseSynchronizer(P, pattern=pattern).fit(X).match(others).times
 
 
 def anchored(std):
     """Dense matching with key-frames of this standard deviation."""
 
-    def times(X, at, template, others, of_others):
-        sync = DenseSynchronizer(P, pattern=template, keyframe_std=std)
+    def times(X, at, pattern, others, of_others):
+        sync = DenseSynchronizer(P, pattern=pattern, keyframe_std=std)
         sync.fit(X, keyframes=own_frames(at, X))
         return sync.match(others, keyframes=own_frames(of_others, others)).times
 
     return times
 
 
-def piecewise_linear(X, at, template, others, of_others):
-    sync = LinearSynchronizer(P, pattern=template)
+def piecewise_linear(X, at, pattern, others, of_others):
+    sync = LinearSynchronizer(P, pattern=pattern)
     sync.fit(X, keyframes=own_frames(at, X))
     return sync.match(others, keyframes=own_frames(of_others, others)).times
 
@@ -78,16 +78,16 @@ def errors_of_others(one, given, judged, method):
     """Errors of the other moment, of people that had no part in the fit."""
     at, wanted = one.moments[given], one.moments[judged]
     seen = np.flatnonzero(np.isfinite(at + wanted))
-    postures, at, wanted = [one.postures[i] for i in seen], at[seen], wanted[seen]
+    poses, at, wanted = [one.poses[i] for i in seen], at[seen], wanted[seen]
     actors, out = np.asarray(one.actors)[seen], []
     for train, test in GroupKFold(min(FOLDS, len(set(actors)))).split(seen, groups=actors):
-        space = ASpace().fit([postures[i] for i in train])
-        points = space.transform(postures)
+        space = ASpace().fit([poses[i] for i in train])
+        points = space.transform(poses)
         known, others = [points[i] for i in train], [points[i] for i in test]
-        for row, template in enumerate(train):
-            if seen[template] in one.patterns:
+        for row, pattern in enumerate(train):
+            if seen[pattern] in one.patterns:
                 times = method(known, at[train], row, others, at[test])
-                landed = [np.interp(wanted[template], FRAMES, tau) for tau in times]
+                landed = [np.interp(wanted[pattern], FRAMES, tau) for tau in times]
                 out.append(np.abs(landed - wanted[test]))
     return np.concatenate(out)
 

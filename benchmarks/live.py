@@ -8,7 +8,7 @@ the other way round (`truth_of`). Errors are in frames of 100, of all frames aft
 of a clip, up to its last.
 
 Peers see the frames up to the present one only. They are written here from their descriptions, and
-look at the clip on *ticks*, the times in which a performance of mean duration passes one frame of
+look at the clip on *ticks*, the times in which a trial of mean duration passes one frame of
 the pattern.
 
 *Intervals* are those of 90 %, all frames counted: the constants of the package were chosen on
@@ -87,9 +87,9 @@ def backward_velocity(x):
 
 
 def _compared(known, clip, kind):
-    """What time warping compares: clip and pattern as postures or one-sided velocities."""
+    """What time warping compares: clip and pattern as poses or one-sided velocities."""
     pair = known.ticks(clip), known.mean
-    return pair if kind == "postures" else tuple(backward_velocity(x) for x in pair)
+    return pair if kind == "poses" else tuple(backward_velocity(x) for x in pair)
 
 
 def open_end_dtw(known, clip, kind="velocities"):
@@ -185,9 +185,9 @@ class Dixon:
 
 PEERS = {
     "open-end DTW, velocities": open_end_dtw,
-    "open-end DTW, postures": functools.partial(open_end_dtw, kind="postures"),
+    "open-end DTW, poses": functools.partial(open_end_dtw, kind="poses"),
     "Dixon's online DTW, velocities": dixon,
-    "Dixon's online DTW, postures": functools.partial(dixon, kind="postures"),
+    "Dixon's online DTW, poses": functools.partial(dixon, kind="poses"),
 }
 
 # -- people -----------------------------------------------------------------------------
@@ -242,16 +242,16 @@ def held_out(actions):
     The actions are of one archive.
     """
     cosines = {a.name: DirectionCosines(a.skeleton).fit(a.data) for a in actions}
-    postures = {a.name: cosines[a.name].transform(a.data) for a in actions}
+    poses = {a.name: cosines[a.name].transform(a.data) for a in actions}
     folds: dict = {}
     for action in actions:
-        own, body = postures[action.name], cosines[action.name]
+        own, body = poses[action.name], cosines[action.name]
         for actor in np.unique(action.actors):
             train, test = (np.flatnonzero((action.actors == actor) == held) for held in (0, 1))
             others = [own[i] for i in train]
             points = ASpace().fit(others)
             wrong = [
-                postures[a.name][i]
+                poses[a.name][i]
                 for a in actions
                 if a is not action
                 for i in np.flatnonzero(a.actors == actor)

@@ -2,7 +2,7 @@
 
     python benchmarks/live_cycles.py DATA_FOLDER [jogs] [walks] [kinect]
 
-By ``OnlineSynchronizer(cyclic=True)``. A template is learnt from the cycles that `CycleSegmenter`
+By ``OnlineSynchronizer(cyclic=True)``. A pattern is learnt from the cycles that `CycleSegmenter`
 cuts from the takes of others. A minute is chained from the cycles of the person held out, as foot
 strikes cut them (cycles.py): each is drawn to the beginning of the next, the pace goes from 0.75 to
 1.25 of its own within 20 seconds, the body travels, turns round twice, and begins in mid-cycle. The

@@ -4,7 +4,7 @@
 
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form. A model
 that can say no accepts what people it has not seen do (`OWN`) and refuses what is not the action
-(`KINDS`): the other actions of the same people, and their own performances spoilt in six ways
+(`KINDS`): the other actions of the same people, and their own trials spoilt in six ways
 (`SPOILT`), all made of points of the aSpace. Every actor is held out in turn, and everything is
 learnt from the others: aSpace, synchronizer, model, border. Walking cycles are one person's, so a
 take of them stands for an actor. Shares are in percent, means over actions. Prints Markdown.
@@ -32,7 +32,7 @@ NOMINAL = (0.80, 0.90, 0.95, 0.99)
 HELD = (*NOMINAL, 0.9973)
 FEW, DRAWS = (5, 10, 20), 2
 
-# -- wrong performances -----------------------------------------------------------------
+# -- wrong trials -----------------------------------------------------------------
 
 
 OWN, OTHERS, BACKWARDS = "own", "other actions", "backwards"
@@ -53,10 +53,10 @@ THERE_AND_BACK += ("hopBothLegs1hops", "pickUp", "waveHands", "clapHands")
 
 
 class Clips(NamedTuple):
-    """Postures (n_frames_i, 37) of a data set, what is done in them, and by whom."""
+    """Poses (n_frames_i, 37) of a data set, what is done in them, and by whom."""
 
     name: str
-    postures: list
+    poses: list
     actions: np.ndarray
     actors: np.ndarray
 
@@ -65,8 +65,8 @@ class Clips(NamedTuple):
         return list(dict.fromkeys(zip(self.actions, self.actors, strict=True)))
 
     def some(self, which):
-        """The postures of those that are chosen by a mask."""
-        return [self.postures[i] for i in np.flatnonzero(which)]
+        """The poses of those that are chosen by a mask."""
+        return [self.poses[i] for i in np.flatnonzero(which)]
 
 
 ARCHIVES = {"hdm05": "HDM05", "utkinect": "UTKinect", "cmu07_walk": "CMU, walking cycles"}
@@ -80,8 +80,8 @@ def read_clips(folder=None):
 
 
 def as_clips(name, bunch):
-    postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-    return Clips(name, list(postures), np.asarray(bunch.target), np.asarray(bunch.actor))
+    poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    return Clips(name, list(poses), np.asarray(bunch.target), np.asarray(bunch.actor))
 
 
 # -- actors held out --------------------------------------------------------------------
@@ -91,7 +91,7 @@ class Fold(NamedTuple):
     """An action, learnt from some actors and tried on another.
 
     ``raw`` and ``synchronised`` hold by kind what is tried, points (n_frames_i, b) of the aSpace
-    and (n, P, b) on the clock of the training performances; kinds that are empty are left out.
+    and (n, P, b) on the clock of the training trials; kinds that are empty are left out.
     """
 
     clips: str
@@ -105,7 +105,7 @@ class Fold(NamedTuple):
 
 
 def hold_out(clips, action, actor):
-    """Everything learnt without an actor: aSpace, synchronizer; then the actor's performances."""
+    """Everything learnt without an actor: aSpace, synchronizer; then the actor's trials."""
     does_it, is_held = clips.actions == action, clips.actors == actor
     train = np.flatnonzero(does_it & ~is_held)
     space = ASpace().fit(clips.some(does_it & ~is_held))
@@ -120,22 +120,22 @@ def hold_out(clips, action, actor):
     return Fold(clips.name, action, actor, known, clips.actors[train], on_clock, raw, synchronised)
 
 
-def hold_out_few(clips, action, actor, n_performances, rng):
-    """The same from a few training performances, of two actors at least, and right ones only.
+def hold_out_few(clips, action, actor, n_trials, rng):
+    """The same from a few training trials, of two actors at least, and right ones only.
 
     Returns these on their clock, their groups, and the actor's own; None if there are not so many.
     """
     does_it, is_held = clips.actions == action, clips.actors == actor
     train = np.flatnonzero(does_it & ~is_held)
-    if len(train) < n_performances or len(set(clips.actors[train])) < 2:
+    if len(train) < n_trials or len(set(clips.actors[train])) < 2:
         return None
     while True:
-        chosen = np.sort(rng.permutation(train)[:n_performances])
+        chosen = np.sort(rng.permutation(train)[:n_trials])
         if len(set(clips.actors[chosen])) > 1:
             break
-    space = ASpace().fit([clips.postures[i] for i in chosen])
+    space = ASpace().fit([clips.poses[i] for i in chosen])
     synchronizer = DenseSynchronizer(P)
-    on_clock = synchronizer.fit_transform([*space.transform([clips.postures[i] for i in chosen])])
+    on_clock = synchronizer.fit_transform([*space.transform([clips.poses[i] for i in chosen])])
     own = synchronizer.transform(_points(space, clips, does_it & is_held))
     return on_clock, clips.actors[chosen], own
 
@@ -169,7 +169,7 @@ class Found(NamedTuple):
     """Of one action and actor.
 
     verdicts : {judge: {kind: decisions}}
-    reached : {(training performances, groups given): accepted (n, nominal)}
+    reached : {(training trials, groups given): accepted (n, nominal)}
     held : {band: shares of points held, and whether all (n, nominal, 2)}
     """
 
@@ -192,7 +192,7 @@ def examine(clips, action, actor):
 
 
 def accepted_at(on_clock, groups, own, label):
-    """Whether right performances are accepted, at every nominal share, with groups and without."""
+    """Whether right trials are accepted, at every nominal share, with groups and without."""
     found = {}
     for given in (groups, None):
         models = [ActionModel(coverage=c).fit(on_clock, groups=given) for c in NOMINAL]
@@ -202,10 +202,10 @@ def accepted_at(on_clock, groups, own, label):
 
 
 def held_by(fold):
-    """Shares of points, and whether the whole, of right performances that bands hold."""
+    """Shares of points, and whether the whole, of right trials that bands hold."""
     bands = {
         "points": (lambda c: ActionModel(n_std=ndtri((1 + c) / 2)), False),
-        "performances": (lambda c: ActionModel(coverage=c), True),
+        "trials": (lambda c: ActionModel(coverage=c), True),
     }
     found = {}
     for band, (make, whole) in bands.items():
@@ -215,7 +215,7 @@ def held_by(fold):
 
 
 def held(bounds, fold):
-    """(n, 2) shares of points, and whether all, of right performances within bounds."""
+    """(n, 2) shares of points, and whether all, of right trials within bounds."""
     own = fold.synchronised[OWN]
     inside = (own >= bounds[0]) & (own <= bounds[1])
     return np.column_stack([inside.mean(axis=(1, 2)), inside.all(axis=(1, 2))])
@@ -280,7 +280,7 @@ def action_table(found_by_set, judge):
 
 
 def border_table(found_by_set):
-    """The share of right performances that is accepted, beside what was asked for."""
+    """The share of right trials that is accepted, beside what was asked for."""
     print_head("accepted, nominal share", ["actions", *(f"{c:.0%}" for c in NOMINAL)])
     for name, found in found_by_set.items():
         for key in product(("all", *FEW), (True, False)):
@@ -291,7 +291,7 @@ def border_table(found_by_set):
 
 
 def band_table(found_by_set):
-    """The share of right points and whole performances that bands hold."""
+    """The share of right points and whole trials that bands hold."""
     header = [f"{what}, {c:.4g}" for what in ("points", "trials") for c in HELD]
     print_head("held", header)
     for name, found in found_by_set.items():

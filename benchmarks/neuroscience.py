@@ -5,11 +5,11 @@
 
 Without affinewarp its rows are left out. The first column has the data of affinewarp's example
 ``piecewise_warping.ipynb``, written anew: 100 trials of 150 bins, 100 neurons, Poisson counts. The
-template of a neuron is sparse noise, and the warp of a trial has one knot. Ends are free: a trial
-begins and stops somewhere about the ends of the template. In the second column trials are shifted,
+pattern of a neuron is sparse noise, and the warp of a trial has one knot. Ends are free: a trial
+begins and stops somewhere about the ends of the pattern. In the second column trials are shifted,
 by up to a tenth of their length, and in the third they are not warped at all.
 
-Warps are fitted to the counts of one half of the neurons. The others are the judge: a template is
+Warps are fitted to the counts of one half of the neurons. The others are the judge: a pattern is
 averaged from four fifths of their trials, and warped to each trial of the last fifth. R^2 is the
 share of the variance of its counts that this explains, beyond the mean rate of each neuron. All
 methods have the same averages, and no judged count is interpolated. Means over data sets.
@@ -24,7 +24,7 @@ from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import DenseSynchronizer
 
 TRIALS, BINS, NEURONS = 100, 150, 100
-# Of the example: spread of the knots, mean of a template before its filter where it is not zero,
+# Of the example: spread of the knots, mean of a pattern before its filter where it is not zero,
 # share of the zeros, width of the filter in bins.
 SPREAD, SCALE, ZEROS, WIDTH = 0.1, 1.0, 0.9, 2.0
 FOLDS = 5
@@ -34,7 +34,7 @@ KINDS = ("one knot", "shift", "no warp")
 
 
 def make_trials(seed, kind="one knot"):
-    """Counts (trials, bins, neurons), and the bin of the template at every bin of each trial."""
+    """Counts (trials, bins, neurons), and the bin of the pattern at every bin of each trial."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, BINS)
     if kind == "one knot":
@@ -46,18 +46,18 @@ def make_trials(seed, kind="one knot"):
     else:
         moments = t + (kind == "shift") * rng.uniform(-SPREAD, SPREAD, (TRIALS, 1))
     shape = BINS, NEURONS
-    template = rng.exponential(SCALE, shape) * (rng.random(shape) > ZEROS)
-    template = gaussian_filter1d(template, WIDTH, axis=0)
-    template[[0, -1]] = 0
+    pattern = rng.exponential(SCALE, shape) * (rng.random(shape) > ZEROS)
+    pattern = gaussian_filter1d(pattern, WIDTH, axis=0)
+    pattern[[0, -1]] = 0
     positions = (BINS - 1) * moments
-    return rng.poisson(sample(template, positions)).astype(float), positions
+    return rng.poisson(sample(pattern, positions)).astype(float), positions
 
 
-def sample(template, positions):
-    """A template (bins, neurons) at positions (trials, bins), linearly between its bins."""
+def sample(pattern, positions):
+    """A pattern (bins, neurons) at positions (trials, bins), linearly between its bins."""
     left, part = split(positions)
     part = part[..., np.newaxis]
-    return (1 - part) * template[left] + part * template[left + 1]
+    return (1 - part) * pattern[left] + part * pattern[left + 1]
 
 
 def split(positions):
@@ -68,7 +68,7 @@ def split(positions):
 
 
 def average(counts, positions):
-    """The template (bins, neurons) of trials that are at such positions of it."""
+    """The pattern (bins, neurons) of trials that are at such positions of it."""
     left, part = (each.ravel() for each in split(positions))
     counts = counts.reshape(len(left), -1)
     sums, weights = np.zeros((BINS, counts.shape[1])), np.zeros((BINS, 1))
@@ -80,7 +80,7 @@ def average(counts, positions):
 
 
 def held_out_r2(counts, positions):
-    """R^2 of trials that have no part in the template they are held against."""
+    """R^2 of trials that have no part in the pattern they are held against."""
     fold = np.arange(len(counts)) % FOLDS
     missed = total = 0.0
     for k in range(FOLDS):

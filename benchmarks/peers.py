@@ -93,7 +93,7 @@ def fdasrsf_mean(lam=0.0):
     return align
 
 
-BOTH = ("posture", "velocity")
+BOTH = ("pose", "velocity")
 TIME_LINES = {
     "tslearn DBA": ("tslearn", tslearn_barycenter, [{}, {"radius": 25}], BOTH),
     "tslearn soft-DTW barycentre": (
@@ -108,7 +108,7 @@ TIME_LINES = {
         [{"n_knots": k} for k in (0, 1, 3)],
         BOTH,
     ),
-    "fdasrsf Karcher mean": ("fdasrsf", fdasrsf_mean, [{}], ("posture", "smoothed")),
+    "fdasrsf Karcher mean": ("fdasrsf", fdasrsf_mean, [{}], ("pose", "smoothed")),
 }
 
 

@@ -46,7 +46,7 @@ from sklearn_motionsync import (
     JointPositions,
     LinearSynchronizer,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 
 from model import SPOILT
 
@@ -56,7 +56,7 @@ COSINES, POSITIONS, BOTH = VIEWS = ("cosines", "positions", "cosines + positions
 
 
 class Recordings(NamedTuple):
-    """Performances (n_frames_i, n_features) by view, what is done in them, and by whom."""
+    """Trials (n_frames_i, n_features) by view, what is done in them, and by whom."""
 
     name: str
     views: dict
@@ -64,12 +64,12 @@ class Recordings(NamedTuple):
     actors: np.ndarray
 
     def some(self, view, chosen):
-        """The performances of some indices."""
+        """The trials of some indices."""
         return [self.views[view][i] for i in chosen]
 
 
 def as_recordings(name, bunch):
-    """Every posture as 37 cosines, as 14 joints seen from the pelvis, and as both in a row."""
+    """Every pose as 37 cosines, as 14 joints seen from the pelvis, and as both in a row."""
     cosines = list(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
     positions = list(JointPositions(bunch.skeleton).fit_transform(bunch.data))
     both = [np.hstack(pair) for pair in zip(cosines, positions, strict=True)]
@@ -92,7 +92,7 @@ class Classifier:
         self._recordings, self._view = recordings, view
 
     def predict(self, train, test):
-        """Actions of performances (n_test,)."""
+        """Actions of trials (n_test,)."""
         return self.learnt(train).predict(self._recordings.some(self._view, test))
 
     def novelty(self, train, test):
@@ -117,7 +117,7 @@ class Scored:
         self._decide = decide
 
     def predict(self, train, test):
-        """Actions of performances (n_test,)."""
+        """Actions of trials (n_test,)."""
         classes, scores = self._decide(train, test)
         return classes[scores.argmax(axis=1)]
 
@@ -304,7 +304,7 @@ KNOWN, UNKNOWN = "known actions", "an unknown action"
 def rejected_on_split(recordings, train, test):
     """{kind: (novelties, border)} for ``reject_below="auto"``: known, spoilt, and unknown actions.
 
-    Spoilt are the performances of the known actions; unknown is each action left out in turn.
+    Spoilt are the trials of the known actions; unknown is each action left out in turn.
     """
     ours = Classifier(recordings, COSINES)
     model, tried = ours.learnt(train), recordings.some(COSINES, test)
@@ -345,7 +345,7 @@ def rejection_tables(kinect, optical, splits):
 def read(folder):
     """UTKinect, HDM05, and the splits of UTKinect."""
     kinect, optical = (
-        as_recordings(name, load_performances(folder / archive / f"{archive}_positions.npz"))
+        as_recordings(name, load_trials(folder / archive / f"{archive}_positions.npz"))
         for archive, name in (("utkinect", "UTKinect"), ("hdm05", "HDM05"))
     )
     splits = published_splits(folder / "utkinect" / "utkinect_splits.json", kinect.actors)

@@ -21,9 +21,9 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    find_performances,
+    find_trials,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 
 P = 50
 FOLDS = [(f"s{i:02d}", f"s{i + 1:02d}") for i in range(1, 11, 2)]
@@ -46,7 +46,7 @@ class Recordings(NamedTuple):
     @classmethod
     def joined(cls, path, every=2):
         """The clips of each actor one after the other, in random order, at half the rate."""
-        bunch = load_performances(path)
+        bunch = load_trials(path)
         clips = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
         clips = [clip[::every] for clip in clips]
         rng, takes, parts = np.random.default_rng(0), [], []
@@ -61,7 +61,7 @@ class Recordings(NamedTuple):
 
     @classmethod
     def read(cls, folder):
-        bunch = load_performances(Path(folder) / "utkinect_positions.npz")
+        bunch = load_trials(Path(folder) / "utkinect_positions.npz")
         cosines = DirectionCosines(bunch.skeleton)
         clips = list(cosines.fit_transform(bunch.data))
         file = np.load(Path(folder) / "utkinect_takes.npz")
@@ -91,9 +91,7 @@ def ours(recordings, action, held_out):
     given = [recordings.takes[i] for i in takes]
     found = {}
     for threshold in ("auto", None):
-        _, locations = find_performances(
-            pipe, given, threshold=threshold, coverage=0.8, max_hits=30
-        )
+        _, locations = find_trials(pipe, given, threshold=threshold, coverage=0.8, max_hits=30)
         rows = locations[["take", "start", "stop", "score"]].to_numpy()
         found[threshold] = [(takes[int(t)], int(a), int(b), s) for t, a, b, s in rows]
     return found
@@ -174,7 +172,7 @@ def figures(found, parts):
     return [*own, best[2], average]
 
 
-METHODS = {"find_performances": ours, "subsequence DTW": dtw}
+METHODS = {"find_trials": ours, "subsequence DTW": dtw}
 
 
 def table(name, recordings, folds):

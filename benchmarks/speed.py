@@ -28,7 +28,7 @@ from harness import print_head, print_row, print_versions
 from jobs import random_walks
 from sklearn_motionsync import DenseSynchronizer
 
-PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
+PAPER = {"cost": "pose", "max_rate": 2, "consensus": 0}
 DEFAULTS, PAPERS = "defaults", "the paper's settings"
 PACKAGES = ("dtaidistance", "aeon", "tslearn", "gdtw")
 
@@ -149,7 +149,7 @@ def compare(title, jobs, rounds, against, clock=time.process_time):
 
 
 def pair():
-    """One pair with its path, and one trial to a fitted template."""
+    """One pair with its path, and one trial to a fitted pattern."""
     X = random_walks()
     paper, ours = DenseSynchronizer(**PAPER).fit(X), DenseSynchronizer().fit(X)
     # Next to nothing to compute: what is left are calls.
@@ -178,13 +178,13 @@ def pairs():
 
 
 def whole():
-    """Template and all warps of a set, beside an average without warps."""
+    """Pattern and all warps of a set, beside an average without warps."""
     X, base = random_walks(), f"`fit_transform`, {DEFAULTS}"
     ours = {
         f"`fit_transform`, {PAPERS}": partial(DenseSynchronizer(**PAPER).fit_transform, X),
         base: partial(DenseSynchronizer().fit_transform, X),
     }
-    title = "template and all warps of 40 trials of 100 x 16"
+    title = "pattern and all warps of 40 trials of 100 x 16"
     compare(title, ours | installed(AVERAGES, X), 11, base)
 
 
@@ -198,7 +198,7 @@ def cold():
         "import sklearn.decomposition, sklearn.pipeline, sklearn.utils.parallel, pandas,"
         "scipy.signal, scipy.interpolate"
     )
-    base = "template and all warps, defaults"
+    base = "pattern and all warps, defaults"
     commands = {
         base: ["-c", ours],
         "`import sklearn_motionsync`": ["-c", "import sklearn_motionsync"],

@@ -7,7 +7,7 @@ of a Kinect, two of ten actors held out. Joints are moved by 1 cm in every coord
 hidden: *arm*, an elbow and its wrist; *legs*, knees and ankles; *gap*, all for 20 frames, half of
 the take where that is shorter. *moved*: all are seen, and moved by 5 cm. Two takes of each actor.
 
-The peer is a Kalman filter and smoother of a Matern-3/2 process about the mean posture of the
+The peer is a Kalman filter and smoother of a Matern-3/2 process about the mean pose of the
 training people, which knows no phase. It is told the covariance of the noise, simulated on training
 people, and has the best of its settings for each column, chosen by the result. The tracker has
 `JointNoise`. Mean error of the joints that are hidden (or moved), over takes, then over actions;
@@ -44,7 +44,7 @@ class Linear(NamedTuple):
 
 
 def matern(takes, length, share):
-    """The mean posture of takes, and a Matern-3/2 process in time about it."""
+    """The mean pose of takes, and a Matern-3/2 process in time about it."""
     frames = np.concatenate(takes)
     rate, d = np.sqrt(3) / length, frames.shape[1]
     C = np.cov(frames.T, bias=True) + LEAST * np.eye(d)
@@ -91,7 +91,7 @@ class Fold:
         self.test = [x for x, a in zip(takes, actors, strict=True) if a == held][:TAKES]
         self.train = [x for x, a in zip(takes, actors, strict=True) if a != held]
         self.cosines = DirectionCosines(skeleton, hidden="nan").fit(self.train)
-        self.postures = self.cosines.transform(self.train)
+        self.poses = self.cosines.transform(self.train)
         self.groups = actors[actors != held]
         columns = self.cosines.position_matrix()[1]
         self.joints = [column[:-2] for column in columns[::3]]
@@ -99,15 +99,15 @@ class Fold:
         self.covariances = {sd: self.covariance(sd) for sd in (SMALL, LARGE)}
 
     def tracker(self, sd):
-        sync = DenseSynchronizer(P).fit(self.postures)
+        sync = DenseSynchronizer(P).fit(self.poses)
         tracker = MotionTracker(sync, noise=JointNoise(sd, self.cosines), random_state=0)
-        return tracker.fit(self.postures, groups=self.groups)
+        return tracker.fit(self.poses, groups=self.groups)
 
     def covariance(self, sd):
         """Of the errors of cosines of training people whose joints are moved."""
         rng = np.random.default_rng(1)
         moved = [x + sd * rng.standard_normal(x.shape) for x in self.train]
-        off = np.concatenate(self.cosines.transform(moved)) - np.concatenate(self.postures)
+        off = np.concatenate(self.cosines.transform(moved)) - np.concatenate(self.poses)
         return off.T @ off / len(off) + LEAST * np.eye(off.shape[1])
 
     def case(self, x, kind, rng):
@@ -130,18 +130,18 @@ class Fold:
             counts[frames, self.joints.index(name)] = True
         return self.cosines.transform([moved])[0], counts | (kind == "moved")
 
-    def place(self, postures, x):
-        """Joints (n_frames, n_joints, 3) of postures of a person with limbs of unit directions."""
+    def place(self, poses, x):
+        """Joints (n_frames, n_joints, 3) of poses of a person with limbs of unit directions."""
         lengths = DirectionCosines(self.skeleton).fit([x]).limb_lengths_
-        limbs = postures[:, 1:].reshape(len(postures), -1, 3)
+        limbs = poses[:, 1:].reshape(len(poses), -1, 3)
         limbs = limbs / np.linalg.norm(limbs, axis=2, keepdims=True)
-        whole = np.column_stack([postures[:, 0], limbs.reshape(len(limbs), -1)])
+        whole = np.column_stack([poses[:, 0], limbs.reshape(len(limbs), -1)])
         return (whole @ self.cosines.position_matrix(lengths)[0].T).reshape(len(whole), -1, 3)
 
-    def error(self, postures, x, counts):
+    def error(self, poses, x, counts):
         """Of joints, in cm."""
         truth = self.place(self.cosines.transform([x])[0], x)
-        return 100 * np.linalg.norm(self.place(postures, x) - truth, axis=2)[counts].mean()
+        return 100 * np.linalg.norm(self.place(poses, x) - truth, axis=2)[counts].mean()
 
 
 def folds_of(folder, archive):
@@ -163,26 +163,26 @@ def table(archive, folder):
     """Errors live / smoothed of ours and of the peer, bands, and frames called lost."""
     folds, errors, bands, lost = list(folds_of(folder, archive)), {}, {}, {}
     for k, fold in enumerate(folds):
-        models = {setting: matern(fold.postures, *setting) for setting in SETTINGS}
+        models = {setting: matern(fold.poses, *setting) for setting in SETTINGS}
         wrong = next(each for each in folds[k:] + folds[:k] if each.action != fold.action)
         for i, (x, kind) in enumerate(product(fold.test, KINDS)):
             sd = LARGE if kind == "moved" else SMALL
             seen, counts = fold.case(x, kind, np.random.default_rng([k, i]))
             tracker, truth = fold.trackers[sd], fold.cosines.transform([x])[0]
             live = tracker.track(seen)
-            pair = live.postures, tracker.smooth(seen).postures
+            pair = live.poses, tracker.smooth(seen).poses
             answers = {"`MotionTracker`": pair}
             for setting, (mean, model) in models.items():
                 found = kalman(model, seen - mean, fold.covariances[sd])
                 answers[setting] = tuple(mean + each for each in found)
             for name, both in answers.items():
                 rows = errors.setdefault(name, {}).setdefault(kind, {})
-                found = [fold.error(postures, x, counts) for postures in both]
+                found = [fold.error(poses, x, counts) for poses in both]
                 rows.setdefault(fold.action, []).append(found)
             wide = 1.645 * np.sqrt(np.diagonal(live.covariances, axis1=1, axis2=2))
             hidden = np.isnan(seen)
             if hidden.any():
-                inside = np.abs(live.postures - truth) <= wide
+                inside = np.abs(live.poses - truth) <= wide
                 bands.setdefault(kind, []).append(inside[hidden].mean())
         for name, takes in (("right", fold.test), ("other", wrong.test[:1])):
             for x in takes:

@@ -67,7 +67,7 @@ class Site:
 
     def __init__(self, root, base=None):
         self.root, self.base = root.resolve(), base and base.rstrip("/")
-        # Themes keep templates of their own in _static: they are no pages.
+        # Themes keep patterns of their own in _static: they are no pages.
         pages = [p for p in self.root.rglob("*.html") if "_static" not in p.parts]
         self.pages = {path.resolve(): Page(path) for path in sorted(pages)}
         self.count, self.problems, self.external = 0, [], set()

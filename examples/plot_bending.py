@@ -4,7 +4,7 @@ Bending down, by many people (Figs. 3 and 4)
 
 You get a report, and two figures: forty bends before and after their alignment, and the poses that
 a model of them accepts. The joint positions become principal components of poses, the aSpace.
-Dense matching aligns them with the most typical trial, the template. `ActionModel` then learns the
+Dense matching aligns them with the most typical trial, the pattern. `ActionModel` then learns the
 mean and how much people vary. The figures are the paper's third and fourth.
 
 The trials are synthetic by default. As a script it also takes an archive of real ones:
@@ -28,7 +28,7 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.display import ActionModelDisplay, SkeletonDisplay, SynchronizationDisplay
 from sklearn_motionsync.metrics import keyframe_error, sobolev_least_squares
 
@@ -65,12 +65,12 @@ if output.exists() and not output.is_dir():
 # and z of every joint.
 
 
-def read_performances(path=None, action=None):
+def read_trials(path=None, action=None):
     """Trials of one action, as a Bunch."""
     if path is None:
         return make_bending(random_state=0)
     try:
-        bunch = load_performances(path)
+        bunch = load_trials(path)
     except (OSError, ValueError) as error:
         stop(f"--data {path}: {error}")
     actions = sorted(set(bunch.target))
@@ -88,7 +88,7 @@ def read_performances(path=None, action=None):
     return bunch
 
 
-bunch = read_performances(options.data, options.action)
+bunch = read_trials(options.data, options.action)
 lengths = [len(x) for x in bunch.data]
 print(f"{len(bunch.data)} trials of {min(lengths)} to {max(lengths)} frames")
 
@@ -169,7 +169,7 @@ rows = [
     ("frames, longest", f"{max(lengths)}", "-"),
     ("eigenvectors b", f"{aspace.n_components_}", "16"),
     ("variance kept", f"{aspace.explained_variance_ratio_.sum():.1%}", "95%"),
-    ("template", f"{median} ({bunch.actor[median]}, take {bunch.take[median]})", "-"),
+    ("pattern", f"{median} ({bunch.actor[median]}, take {bunch.take[median]})", "-"),
     ("its global distance", f"{margin:.1%} below the next", "-"),
     ("left unexplained", f"{dense.unexplained_variance_:.3f}", "-"),
     ("refined by poses", "yes" if dense.refines_ else "no: people differ", "-"),
@@ -223,21 +223,21 @@ keyframes = bunch.get("keyframes")
 straight = LinearSynchronizer(n_frames=100).fit_transform(points, keyframes=keyframes)
 for column, axis in enumerate(axes[2]):
     axis.plot(straight[:, :, column].T, color="#009E73", alpha=0.5, linewidth=0.9)
-    axis.set_xlabel("frame of the template")
+    axis.set_xlabel("frame of the pattern")
 shown = ActionModelDisplay.from_estimator(
     pipe, bunch.data, features=range(n_dims), band="points", ax=axes[3]
 )
 shown.axes_[0].get_legend().remove()
 titles = (
     f"as recorded: {len(points)} trials",
-    "aligned by dense matching; black: the template",
+    "aligned by dense matching; black: the pattern",
     "stretched evenly" + ("" if keyframes is None else " between 5 key-frames in each"),
     "the model: mean and three standard deviations",
 )
 for place, (row, title) in enumerate(zip(axes, titles, strict=True)):
     for column, axis in enumerate(row):
         axis.set_title("")
-        axis.set_xlabel(f"frame of the {'template' if place else 'trial'}")
+        axis.set_xlabel(f"frame of the {'pattern' if place else 'trial'}")
         axis.set_ylabel("" if column else "first dimension")
     row[0].set_title(title, loc="left", fontsize="medium")
 for axis in axes[:, 1:].flat:
@@ -254,13 +254,13 @@ dimensions.suptitle(
 # training trial at that frame.
 
 display = SkeletonDisplay.from_model(pipe, frames=(0.1, 0.4), random_state=0)
-postures = display.figure_
-postures.suptitle("The model accepts poses that are close to its mean")
+poses = display.figure_
+poses.suptitle("The model accepts poses that are close to its mean")
 
 # %%
 
 output.mkdir(parents=True, exist_ok=True)
-for name, figure in (("dimensions", dimensions), ("postures", postures)):
+for name, figure in (("dimensions", dimensions), ("poses", poses)):
     path = output / f"bending_{name}.png"
     figure.savefig(path, dpi=120)
     print(f"figure written: {path.name}")

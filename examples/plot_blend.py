@@ -14,7 +14,7 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     Match,
-    blend_performances,
+    blend_trials,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay
@@ -33,9 +33,9 @@ X = [bunch.data[np.argmax(lengths)], bunch.data[np.argmin(lengths)]]
 # Weights of one half each give the mean of both. Directions of limbs are averaged on the sphere, so
 # each limb keeps the mean of both lengths.
 
-blend = blend_performances(pipe, X, [0.5, 0.5])
+blend = blend_trials(pipe, X, [0.5, 0.5])
 
-display = SkeletonDisplay.from_performances(
+display = SkeletonDisplay.from_trials(
     [X[0], blend, X[1]], bunch.skeleton, names=["slow", "blend", "fast"]
 )
 animation = display.animate(seconds=3, fps=8)
@@ -81,8 +81,8 @@ _ = axis.set_title(
 # Weights add up to 1, but may be below 0 or above 1. The differences between both people are then
 # exaggerated. The timing can have weights of its own.
 
-beyond = blend_performances(pipe, X, [1.7, -0.7])
-moved = blend_performances(pipe, X, [1, 0], timing=[0, 1])
+beyond = blend_trials(pipe, X, [1.7, -0.7])
+moved = blend_trials(pipe, X, [1, 0], timing=[0, 1])
 figure, axis = plt.subplots(figsize=(6.4, 3.2), layout="constrained")
 curves = {
     "slow": (X[0], "#0072B2", "-"),
@@ -106,7 +106,7 @@ _ = axis.set_title(
 # Without a skeleton, positions are averaged as numbers. These two people do not face the same way,
 # and the mean is no human body: its shoulders are too narrow.
 
-numbers = blend_performances(Match.from_estimator(pipe, X), X, [0.5, 0.5])
+numbers = blend_trials(Match.from_estimator(pipe, X), X, [0.5, 0.5])
 figure, axis = plt.subplots(figsize=(6.4, 3.2), layout="constrained")
 for name, x, color in (
     ("slow", X[0], "#0072B2"),

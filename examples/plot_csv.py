@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import DenseSynchronizer, FrameWise, Match, to_frame, to_sequences
+from sklearn_motionsync import DenseSynchronizer, FrameWise, Match, to_frame, to_trials
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import SynchronizationDisplay
 
@@ -27,7 +27,7 @@ from sklearn_motionsync.display import SynchronizationDisplay
 folder = Path(tempfile.mkdtemp())
 gait = make_gait(6, n_cycles=3, timing=5, random_state=0)
 names = pd.MultiIndex.from_arrays([gait.person, gait.cycle], names=["subject", "trial"])
-table = to_frame(gait.data, performances=names, columns=gait.feature_names)
+table = to_frame(gait.data, trials=names, columns=gait.feature_names)
 table = table.rename_axis(["subject", "trial", "time"]).reset_index()
 table["time"] /= gait.frame_rate
 table.to_csv(folder / "trials.csv", index=False)
@@ -39,7 +39,7 @@ table.head()
 # ``by`` names the columns of subject and trial, and ``time`` that of the time. Degrees and body
 # weights are first brought to one scale.
 
-trials = to_sequences(pd.read_csv(folder / "trials.csv"), by=["subject", "trial"], time="time")
+trials = to_trials(pd.read_csv(folder / "trials.csv"), by=["subject", "trial"], time="time")
 pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(n_frames=101)).fit(trials)
 match = Match.from_estimator(pipe, trials)
 
@@ -71,9 +71,9 @@ display.figure_.savefig(folder / "trials.png")
 # Back to a table
 # ---------------
 # The first table holds the aligned signals in their own units. The second one holds the time shifts
-# in per cent of the cycle. A positive shift means later than the template.
+# in per cent of the cycle. A positive shift means later than the pattern.
 
-curves = to_frame(aligned, performances=trials, columns=trials[0].columns)
+curves = to_frame(aligned, trials=trials, columns=trials[0].columns)
 curves.to_csv(folder / "aligned.csv")
 timing = match.to_frame("percent", trials)
 timing.to_csv(folder / "timing.csv")
@@ -86,7 +86,7 @@ timing["offset"].unstack()[[0, 20, 40, 60, 80, 100]].groupby("subject").mean().r
 
 broken = table.drop(index=table.index[40:60])
 try:
-    to_sequences(broken, by=["subject", "trial"], time="time")
+    to_trials(broken, by=["subject", "trial"], time="time")
 except ValueError as error:
     print(error)
 

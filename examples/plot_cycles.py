@@ -3,7 +3,7 @@ Long takes cut into cycles
 ==========================
 
 You get single gait cycles from takes of several steps, without any event marked by hand. The
-self-correlation of a take gives the period, if there is one. Dense matching to a template cycle
+self-correlation of a take gives the period, if there is one. Dense matching to a pattern cycle
 then finds where each cycle begins. The true moments are known here, so both can be judged.
 """
 
@@ -21,7 +21,7 @@ takes = FrameWise(StandardScaler()).fit_transform(gait.data)  # degrees and body
 # %%
 # The period, and the cuts
 # ------------------------
-# Half of the people give the template of one cycle. It begins where the hip is flexed most. The
+# Half of the people give the pattern of one cycle. It begins where the hip is flexed most. The
 # takes of the others are cut at the same moment. The upper panel shows the self-correlation of one
 # take, and the lower one its hip.
 

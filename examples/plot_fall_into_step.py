@@ -21,10 +21,10 @@ pipe.fit(bunch.data)
 # In motion
 # ---------
 # The principal components of the poses are matched. The joint positions then follow the same
-# warps. The leftmost trial is the template, which the others are aligned with.
+# warps. The leftmost trial is the pattern, which the others are aligned with.
 
 display = SkeletonDisplay.from_estimator(
-    pipe, bunch.data, performances=[pipe[-1].pattern_index_, 0, 1, 2]
+    pipe, bunch.data, trials=[pipe[-1].pattern_index_, 0, 1, 2]
 )
 display.figure_.suptitle("Aligned (below), all of them reach the floor together")
 animation = display.animate(seconds=4, fps=12)
@@ -37,14 +37,14 @@ animation
 # The height of the pelvis and the lean of the torso are part of the pose. A pipeline without an
 # aSpace shows them.
 
-postures = make_pipeline(DirectionCosines(bunch.skeleton), DenseSynchronizer()).fit(bunch.data)
+poses = make_pipeline(DirectionCosines(bunch.skeleton), DenseSynchronizer()).fit(bunch.data)
 display = SynchronizationDisplay.from_estimator(
-    postures, bunch.data, features=["pelvis_height", "torso_z"], groups=bunch.actor
+    poses, bunch.data, features=["pelvis_height", "torso_z"], groups=bunch.actor
 )
 display.axes_[0].set_ylabel("pelvis height\n(1: upright)")
 display.axes_[2].set_ylabel("torso forward\n(cosine)")
-curves = postures.transform(bunch.data)[:, :, 0]
-lowest = [100 * x[:, 0].argmin() / (len(x) - 1) for x in postures[:-1].transform(bunch.data)]
+curves = poses.transform(bunch.data)[:, :, 0]
+lowest = [100 * x[:, 0].argmin() / (len(x) - 1) for x in poses[:-1].transform(bunch.data)]
 aligned = 100 * curves.argmin(axis=1) / (curves.shape[1] - 1)
 _ = display.figure_.suptitle(
     f"The lowest points meet:\nspread {np.std(lowest):.1f} before, "
@@ -62,7 +62,7 @@ _ = display.figure_.suptitle("One bend, from upright to upright")
 # What is refused
 # ---------------
 # A recording that was cut off does not end where the others end. Nothing can show that in advance,
-# so it is aligned as well, and its last pose meets the end of the template. A trial whose joints
+# so it is aligned as well, and its last pose meets the end of the pattern. A trial whose joints
 # are missing is refused:
 
 try:

@@ -14,7 +14,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    find_performances,
+    find_trials,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SearchDisplay
@@ -66,15 +66,15 @@ second = np.concatenate([*second, standing(100)])
 # The score is 1 for a trial that equals the two most similar bends of the training set. It is 0.37
 # for one that differs from them as much as standing still.
 
-performances, locations = find_performances(pipe, [first, second])
+trials, locations = find_trials(pipe, [first, second])
 print(locations.round(2).to_string())
 print("true:", [part[1:] for part in true])
 
 # %%
 # The trials that were found can be aligned, or written to a table, as any others.
 
-print("frames of each:", [len(x) for x in performances])
-print("aligned:", pipe[:-1].transform(performances).shape)
+print("frames of each:", [len(x) for x in trials])
+print("aligned:", pipe[:-1].transform(trials).shape)
 
 # %%
 # What is refused

@@ -45,7 +45,7 @@ frames = np.array([events(curve) for curve in steps])
 
 
 def spread(synchronizer):
-    """The spread of each event where the warps put it on the template."""
+    """The spread of each event where the warps put it on the pattern."""
     times = synchronizer.match(steps).times
     placed = [np.interp(at, tau, percent) for at, tau in zip(frames, times, strict=True)]
     return np.std(placed, axis=0)

@@ -41,7 +41,7 @@ def errors(found, label):
     """Milliseconds from each true event to the nearest one of the same foot."""
     out = []
     for i, true in enumerate(truth):
-        own = found[(found["performance"] == i) & (found["label"] == label)]
+        own = found[(found["trial"] == i) & (found["label"] == label)]
         for event in true:
             if event["label"] == label:
                 times = own.loc[own["context"] == event["context"], "time"].to_numpy()

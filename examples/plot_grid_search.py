@@ -39,14 +39,14 @@ search.best_params_
 # `FeatureHoldoutScorer` matches by some signals and judges by the others. The true timing is known
 # here, and shows whether the choice is right.
 
-postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
 offsets = [0, 0.03, 0.06, 0.1, 0.15, 0.25, 0.4]
 blind = GridSearchCV(
     DenseSynchronizer(n_frames=60), {"max_offset": offsets}, cv=2, scoring=FeatureHoldoutScorer()
-).fit(postures)
+).fit(poses)
 error = [
     group_timing_error(
-        DenseSynchronizer(n_frames=60, max_offset=m).fit(postures).match(postures).times,
+        DenseSynchronizer(n_frames=60, max_offset=m).fit(poses).match(poses).times,
         bunch.times,
     )
     for m in offsets

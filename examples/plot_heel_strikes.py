@@ -31,7 +31,7 @@ def as_recording(gait, i):
     take.attrs = {
         "events": gait.events[i],
         "frame_rate": gait.frame_rate,
-        "performance": gait.person[i],
+        "trial": gait.person[i],
     }
     return take
 
@@ -70,7 +70,7 @@ _ = figure.legend(
 # key-frame of each cycle.
 
 cycles = [cycle for take in takes for cycle in cut_at_events(take, "Foot Strike")]
-person = [cycle.attrs["performance"][0] for cycle in cycles]
+person = [cycle.attrs["trial"][0] for cycle in cycles]
 toe_off = keyframes_from_events(cycles)
 print(len(cycles), "cycles of", [len(cycle) for cycle in cycles[:6]], "... frames")
 print("toe-off at frame", toe_off.iloc[:6, 0].round(1).tolist(), "...")
@@ -120,7 +120,7 @@ pd.DataFrame(spreads, index=names).round(2)
 
 
 def aligned(cycles):
-    """Curves aligned with the template, with their names."""
+    """Curves aligned with the pattern, with their names."""
     match = dense.match(scaler.transform(cycles))
     return [pd.DataFrame(x, columns=gait.feature_names) for x in match.warp(cycles)]
 
@@ -153,7 +153,7 @@ pd.DataFrame({"model": model.predict(new), "frames": [len(x) for x in shown.valu
 # %%
 # The band holds 95 % of the whole cycles of new people. Violet parts are outside.
 
-display = ActionModelDisplay.from_estimator(model, new, band="performances", unit="percent")
+display = ActionModelDisplay.from_estimator(model, new, band="trials", unit="percent")
 units = ("degrees", "degrees", "degrees", "body weights")
 for axis, name, unit in zip(display.axes_, gait.feature_names, units, strict=True):
     axis.set_ylabel(f"{name.replace('_', ' ')}\n({unit})")
@@ -165,7 +165,7 @@ _ = display.figure_.suptitle(
 # The worst departure of each signal, of those that are rare among healthy people:
 
 departures = find_departures(model, new)
-departures[departures["rare"]].groupby(["performance", "feature"]).head(1).round(1)
+departures[departures["rare"]].groupby(["trial", "feature"]).head(1).round(1)
 
 # %%
 # Where it fails

@@ -56,12 +56,12 @@ touches = np.array(
 )
 
 # %%
-# All trials are aligned with one template, and then each way with a template of its own. The
-# spread is the standard deviation of the touch on the time line of the template.
+# All trials are aligned with one pattern, and then each way with a pattern of its own. The
+# spread is the standard deviation of the touch on the time line of the pattern.
 
 
 def spread_of_touch(chosen):
-    """The spread of the touch in per cent of the template, and the match."""
+    """The spread of the touch in per cent of the pattern, and the match."""
     trials = [x for x, one in zip(two_ways, chosen, strict=True) if one]
     match = DenseSynchronizer(n_frames=101).fit(trials).match(trials)
     pairs = zip(match.times, touches[chosen], strict=True)
@@ -85,7 +85,7 @@ for color, label in ((BLUE, "bends"), (ORANGE, "kneels")):
     axes[0].plot([], [], color=color, label=label)
 axes[0].plot([], [], "k--", label="mean of all")
 axes[0].legend(frameon=False, fontsize="small")
-axes[1].set_xlabel("% of the template")
+axes[1].set_xlabel("% of the pattern")
 _ = figure.suptitle("The mean is half a bend and half a kneel: no trial looks so")
 
 # %%
@@ -131,7 +131,7 @@ axes[0].set_title("time normalised", fontsize="medium")
 axes[1].set_title("aligned", fontsize="medium")
 for axis in axes:
     axis.set_ylabel("position (no unit)")
-axes[1].set_xlabel("% of the template")
+axes[1].set_xlabel("% of the pattern")
 _ = figure.suptitle("Two of three strokes share the place of one")
 
 # %%
@@ -163,7 +163,7 @@ for color, label in ((BLUE, "bends"), (ORANGE, "throw")):
 axes[0].legend(frameon=False, fontsize="small")
 axes[0].set_ylabel("time in the trial (%)")
 axes[1].set_ylabel("second signal (no unit)")
-axes[1].set_xlabel("% of the template")
+axes[1].set_xlabel("% of the pattern")
 _ = figure.suptitle("The warp of the throw looks like any other,\nits curve does not")
 
 # %%

@@ -38,7 +38,7 @@ print({i: f"{np.isnan(gappy[i]).mean():.0%} hidden" for i in lost})
 # Aligned as they are
 # -------------------
 # Every pose is at a known phase of the bend. So the frame of a trial that corresponds to each frame
-# of the template is known, too.
+# of the pattern is known, too.
 
 FRAMES = 100
 
@@ -47,9 +47,9 @@ def phases_of(i):
     return bends.times[i] / bends.times[i][-1]
 
 
-def true_times(i, template=0):
-    """Times of a trial, in frames of the template, by the known phases."""
-    own, wanted = phases_of(i), phases_of(template)
+def true_times(i, pattern=0):
+    """Times of a trial, in frames of the pattern, by the known phases."""
+    own, wanted = phases_of(i), phases_of(pattern)
     clock = np.linspace(0, 1, FRAMES)
     phase = np.interp(clock, np.linspace(0, 1, len(wanted)), wanted)
     return np.interp(phase, own, np.linspace(0, FRAMES - 1, len(own)))
@@ -90,7 +90,7 @@ figure, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3), layout="constrained
 left.plot(truth, color=GREY, linestyle="--", label="true")
 left.plot(np.where(np.isnan(aligned), filled, np.nan), color=ORANGE, label="filled")
 left.plot(aligned, color=BLUE, label="seen")
-left.set(xlabel="frame of the template", ylabel="forearm, upwards", title=f"trial {shown}, aligned")
+left.set(xlabel="frame of the pattern", ylabel="forearm, upwards", title=f"trial {shown}, aligned")
 left.legend(frameon=False, fontsize="small")
 place = np.arange(len(found))
 right.bar(place, [np.mean(e) for e, _ in found.values()], color=[GREY, BLUE, GREY, GREY])

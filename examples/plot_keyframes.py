@@ -10,7 +10,7 @@ do.
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from sklearn_motionsync import DenseSynchronizer, to_sequences
+from sklearn_motionsync import DenseSynchronizer, to_trials
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import SynchronizationDisplay
 from sklearn_motionsync.io import keyframes_from_events
@@ -23,7 +23,7 @@ def record_walks(random_state, signals=("ankle_dorsiflexion",), **walks):
     table = pd.concat(curves, keys=gait.person, names=["person", "frame"])
     person = pd.Index(gait.person, name="person")
     moments = pd.DataFrame(gait.keyframes, columns=gait.keyframe_names, index=person)
-    return to_sequences(table), moments
+    return to_trials(table), moments
 
 
 different = {"style": 6, "warp": 3, "noise": 3}
@@ -53,7 +53,7 @@ def match_trials(trials, keyframes=None, keyframe_std=0):
 
 
 def landed(match, trials, moments):
-    """Where true moments are after the alignment, in per cent of the template."""
+    """Where true moments are after the alignment, in per cent of the pattern."""
     percent, true = np.linspace(0, 100, match.times.shape[1]), moments.to_numpy()
     return [np.interp(own, f, percent) for own, f in zip(true, match.frames(trials), strict=True)]
 
@@ -74,14 +74,14 @@ for axis, given in zip(axes, (None, keyframes), strict=True):
     name = "nothing given" if given is None else "heel strikes given"
     axis.set_title(f"{name}: toe-offs have a deviation of {spread:.1f} %", fontsize="medium")
     axis.set_ylabel("ankle (degrees)")
-axes[1].set_xlabel("% of the template")
+axes[1].set_xlabel("% of the pattern")
 axes[0].legend([dots], ["true toe-off"], frameon=False, loc="upper left")
 _ = figure.suptitle("Heel strikes bring back the walk that went astray")
 
 # %%
 # Nothing given, one walk is half a stride off: its toe-offs are on the bump after the others.
 #
-# Displays draw what was given: lines on the time axis of the template, ticks below the trials.
+# Displays draw what was given: lines on the time axis of the pattern, ticks below the trials.
 
 sync = DenseSynchronizer(151).fit(trials, keyframes=keyframes)
 display = SynchronizationDisplay.from_estimator(
@@ -133,7 +133,7 @@ for place, way in enumerate(ways):
 axis.set_yticks(range(len(ways)), ways)
 axis.set_xscale("log")
 axis.set_xticks([1, 2, 5, 10], ["1", "2", "5", "10"])
-axis.set_xlabel("deviation of toe-offs (% of the template); line: geometric mean")
+axis.set_xlabel("deviation of toe-offs (% of the pattern); line: geometric mean")
 _ = figure.suptitle("Exact labels halve it; a few labels help, too")
 
 # %%

@@ -18,7 +18,7 @@ from sklearn_motionsync.metrics import group_timing_error
 bunch = make_bending(12, random_state=2)
 cosines = DirectionCosines(bunch.skeleton).set_output(transform="pandas")
 columns = ["pelvis_height", "torso_y", "torso_z", "left_thigh_y", "right_arm_y", "right_forearm_y"]
-postures = cosines.fit_transform(bunch.data)[columns]
+poses = cosines.fit_transform(bunch.data)[columns]
 
 # %%
 # Three columns of noise
@@ -36,7 +36,7 @@ def drift(n_frames, random_state):
 
 def with_drift(draws):
     """The poses, and beside them the noise that is drawn for each trial."""
-    table, spread = postures.copy(), postures.std().mean()
+    table, spread = poses.copy(), poses.std().mean()
     both = zip(bunch.data, draws, strict=True)
     drifts = np.concatenate([drift(len(x), draw) for x, draw in both])
     table[["drift0", "drift1", "drift2"]] = spread * drifts
@@ -61,14 +61,14 @@ for name, energy, share in zip(noisy.columns, found.energy, found.share, strict=
 # %%
 # How far noise moves the warps
 # -----------------------------
-# All fits have the same template. The true timing is known here. The error is how far apart the
+# All fits have the same pattern. The true timing is known here. The error is how far apart the
 # trials show the same moment, in frames.
 
 base = learned.pattern_index_
 errors, moves = {}, {}
 for metric in ("learned", None):
     dense = DenseSynchronizer(100, pattern=base, metric=metric)
-    clean, moved = (dense.fit(table).match(table).times for table in (postures, noisy))
+    clean, moved = (dense.fit(table).match(table).times for table in (poses, noisy))
     errors[metric] = [group_timing_error(times, bunch.times) for times in (clean, moved)]
     moves[metric] = np.abs(moved - clean).mean()
 
@@ -109,6 +109,6 @@ for name, table, dense in (("differs", noisy, learned), ("repeats", same, fooled
 # %%
 # Two trials are too few: ``metric_`` is then None, and nothing is weighted.
 
-pair = [x.to_numpy() for _, x in noisy.groupby(level="performance")][:2]
+pair = [x.to_numpy() for _, x in noisy.groupby(level="trial")][:2]
 print(DenseSynchronizer(100).fit(pair).metric_)
 plt.show()

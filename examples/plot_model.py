@@ -58,7 +58,7 @@ shown = {
     "ends cut off": bend[n // 6 : -(n // 6)],
     "left arm lifted": lift_left_arm(bend, 0.4, 0.65),
 }
-performances = list(shown.values())
+trials = list(shown.values())
 
 # %%
 # The model compares aligned trials. Alignment removes the pace, so the model accepts a bend at half
@@ -67,9 +67,9 @@ performances = list(shown.values())
 detector = ActionDetector(pipe).fit(bunch.data, groups=bunch.actor)
 verdicts = pd.DataFrame(
     {
-        "model": pipe.predict(performances),
-        "detector": detector.predict(performances),
-        "reason": detector.report(performances)["reason"].to_numpy(),
+        "model": pipe.predict(trials),
+        "detector": detector.predict(trials),
+        "reason": detector.report(trials)["reason"].to_numpy(),
     },
     index=list(shown),
 )
@@ -79,7 +79,7 @@ verdicts
 # ``score_samples`` is the log likelihood of each trial. The distance from the best one shows how
 # clear each verdict of the model is.
 
-unlike = pipe.score_samples(performances)
+unlike = pipe.score_samples(trials)
 unlike = unlike.max() - unlike + 1
 rows = np.argsort(unlike)
 colors = np.where(verdicts["model"] == 1, "#0072B2", "#D55E00")
@@ -116,7 +116,7 @@ display = ActionModelDisplay.from_estimator(
     pipe,
     [bend, shown["left arm lifted"]],
     features=["left_arm_y", "torso_z"],
-    band="performances",
+    band="trials",
     unit="percent",
 )
 for axis, name in zip(display.axes_, ("left arm upwards", "torso forward"), strict=True):

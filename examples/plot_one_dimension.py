@@ -19,19 +19,19 @@ from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import group_timing_error
 
 bunch = make_bending(12, random_state=2)
-postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-points = ASpace(0.95).fit_transform(postures)
+poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+points = ASpace(0.95).fit_transform(poses)
 
 # %%
 # Two of the twelve
 # -----------------
-# They are the template, and the trial whose pace differs most from it.
+# They are the pattern, and the trial whose pace differs most from it.
 
 dense = DenseSynchronizer(n_frames=100).fit(points)
 base = dense.pattern_index_
 other = np.abs(dense.match(points).offsets).mean(axis=1).argmax()
 pair = [base, other]
-print(f"the template is trial {base}, the other one trial {other}")
+print(f"the pattern is trial {base}, the other one trial {other}")
 
 # %%
 # Three alignments
@@ -54,7 +54,7 @@ warped = {
 }
 
 figure, axes = plt.subplots(2, 2, figsize=(6.4, 5), sharey=True, layout="constrained")
-styles = [("black", "-", "template"), ("#0072B2", "--", "other trial")]
+styles = [("black", "-", "pattern"), ("#0072B2", "--", "other trial")]
 for i, (color, line, label) in zip(pair, styles, strict=True):
     axes[0, 0].plot(points[i][:, 0], line, color=color, label=label)
     for axis, result in zip(axes.flat[1:], warped.values(), strict=True):

@@ -16,7 +16,7 @@ from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import LagDisplay
 
 bunch = make_bending(16, n_frames=60, random_state=0)
-postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
 parts = bunch.skeleton.parts()
 
 
@@ -30,9 +30,9 @@ def late(x, columns, percent):
 
 rng = np.random.default_rng(0)
 arm_is_late = np.isin(bunch.actor, bunch.actor[:2])
-trunk_delay = rng.choice([0, 6], size=len(postures))
+trunk_delay = rng.choice([0, 6], size=len(poses))
 X = []
-for x, arm, delay in zip(postures, arm_is_late, trunk_delay, strict=True):
+for x, arm, delay in zip(poses, arm_is_late, trunk_delay, strict=True):
     X.append(late(late(x, parts["right arm"], 6 * arm), parts["trunk"], delay))
 
 # %%
@@ -77,7 +77,7 @@ for is_late, color, name in (
     axis.plot(percent, lags.values[arm_is_late == is_late, arm].T, color=color, alpha=0.6)
     axis.plot([], [], color=color, label=name)
 axis.plot(percent, 6 * np.sin(np.pi * percent / 100) ** 2, "k--", label="true delay")
-axis.set_xlabel("% of the template")
+axis.set_xlabel("% of the pattern")
 axis.set_ylabel("lag of the right arm\n(% of the time)")
 axis.legend(loc="upper right", frameon=False)
 _ = axis.set_title("The arms of two people are late, those of the others are not")

@@ -116,9 +116,9 @@ shown = {
 }
 
 
-def judge(performances):
+def judge(trials):
     """The answer, the most similar class, and how unlike all classes a trial is."""
-    features, classifier = pipe[:-1].transform(performances), pipe[-1]
+    features, classifier = pipe[:-1].transform(trials), pipe[-1]
     chances = classifier.predict_proba(features)
     return pd.DataFrame(
         {
@@ -163,7 +163,7 @@ _ = display.heading_.set_text(
 # How often an unknown action is rejected depends on the known ones. Below, each action is left
 # out in turn. The classifiers know the four others, and not the people whom they judge.
 
-postures = DirectionCosines(bunch.skeleton).fit_transform(X)
+poses = DirectionCosines(bunch.skeleton).fit_transform(X)
 
 
 def novelty_of_new_people(action):
@@ -172,8 +172,8 @@ def novelty_of_new_people(action):
     for train, test in GroupKFold(2).split(X, groups=bunch.actor):
         train = train[y[train] != action]
         four = ActionClassifier(n_frames=30)
-        four.fit([postures[i] for i in train], y[train], groups=bunch.actor[train])
-        scores = four.score_samples([postures[i] for i in test])
+        four.fit([poses[i] for i in train], y[train], groups=bunch.actor[train])
+        scores = four.score_samples([poses[i] for i in test])
         above[test] = four.threshold_at(0.95) - scores
     return above
 

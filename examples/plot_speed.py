@@ -54,7 +54,7 @@ for v in np.unique(speed):
     mean = offsets[speed == v].mean(axis=0)
     axis.plot(mean, color=colors((v - 0.9) / 1.1), label=f"{v:.1f} m/s")
 axis.set_ylabel("mean offset (%), later is above")
-axis.set_xlabel("% of the template")
+axis.set_xlabel("% of the pattern")
 axis.legend(frameon=False, fontsize="small", ncols=2)
 _ = axis.set_title("The faster, the earlier", fontsize="medium")
 

@@ -48,8 +48,8 @@ filtered, smoothed = tracker.track(seen), tracker.smooth(seen)
 # all eight people. These people are synthetic; real people differ more, and errors are larger.
 
 
-def degrees(postures, true):
-    a, b = (x[second][:, gone].reshape(RATE, -1, 3) for x in (postures, true))
+def degrees(poses, true):
+    a, b = (x[second][:, gone].reshape(RATE, -1, 3) for x in (poses, true))
     dots = (a * b).sum(axis=-1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
     return np.degrees(np.arccos(np.clip(dots, -1, 1))).mean()
 
@@ -70,15 +70,15 @@ def straight(x):
 
 def within(track, true):
     wide = 1.645 * np.sqrt(np.diagonal(track.covariances, axis1=1, axis2=2))
-    return (np.abs(track.postures - true) <= wide)[second][:, gone].mean()
+    return (np.abs(track.poses - true) <= wide)[second][:, gone].mean()
 
 
 errors = {}
 for name, answers in (
     ("last pose kept", [kept(x) for x in seen]),
     ("straight lines", [straight(x) for x in seen]),
-    ("filter", [track.postures for track in filtered]),
-    ("smoother", [track.postures for track in smoothed]),
+    ("filter", [track.poses for track in filtered]),
+    ("smoother", [track.poses for track in smoothed]),
 ):
     errors[name] = [degrees(x, true) for x, true in zip(answers, truth, strict=True)]
 for name, tracks in (("filter", filtered), ("smoother", smoothed)):
@@ -120,10 +120,8 @@ _ = display.figure_.suptitle("Hidden limbs (violet) follow the true body (pale)"
 # The smoother, with what was seen and the truth beside it:
 
 hiding = DirectionCosines(known.skeleton, hidden="nan").fit(known.data)
-bodies = hiding.inverse_transform([seen[0], smoothed[0].postures, truth[0]])
-people = SkeletonDisplay.from_performances(
-    bodies, known.skeleton, names=["seen", "estimate", "truth"]
-)
+bodies = hiding.inverse_transform([seen[0], smoothed[0].poses, truth[0]])
+people = SkeletonDisplay.from_trials(bodies, known.skeleton, names=["seen", "estimate", "truth"])
 animation = people.animate(seconds=2.5, fps=8)
 plt.close()  # the player below shows it
 animation
@@ -149,7 +147,7 @@ shown = TrackingDisplay.from_estimator(
     tracker, out_of_sight, truth=waving, names=names, features="left_arm_y"
 )
 shown.axes_[0].set_ylabel("left arm\nupwards\n(cosine)")
-off = degrees(shown.track.postures, waving)
+off = degrees(shown.track.poses, waving)
 _ = shown.figure_.suptitle(f"Hidden, the waving is missed: {off:.0f}° off")
 
 # %%

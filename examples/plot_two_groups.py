@@ -21,7 +21,7 @@ from sklearn_motionsync.display import GroupDisplay
 # ----------------------------------------
 # The signals are flexion of hip, knee and ankle, and the vertical force. They are synthetic, so the
 # true difference is known: toe-off is 3 % of the cycle later in group B, and all else is equal. One
-# template is learnt from the cycles of both groups. People are compared by the means of their
+# pattern is learnt from the cycles of both groups. People are compared by the means of their
 # cycles.
 
 gait = make_gait(20, n_cycles=2, timing=3, random_state=1)

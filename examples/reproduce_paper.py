@@ -27,7 +27,7 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.display import SkeletonDisplay, TrellisDisplay
 
 P, ACTION, SHARE = 100, "depositFloorR", 0.95
@@ -141,7 +141,7 @@ def main():
     parser.add_argument("--data", required=True, help="archive of HDM05 (.npz)")
     parser.add_argument("--output", default=".", help="folder of the figures")
     options = parser.parse_args()
-    bunch, output = load_performances(options.data), Path(options.output)
+    bunch, output = load_trials(options.data), Path(options.output)
     output.mkdir(exist_ok=True)
     X = [x for x, action in zip(bunch.data, bunch.target, strict=True) if action == ACTION]
     cosines, aspace = DirectionCosines(bunch.skeleton), ASpace(SHARE)
@@ -199,7 +199,7 @@ def main():
 
     model = ActionModel().fit(synchronised["paper"])
     draw_first_figure(points, synchronised).savefig(output / "figure_1.png", dpi=100)
-    trellis = TrellisDisplay.from_estimator(methods["paper"], points, performance=1)
+    trellis = TrellisDisplay.from_estimator(methods["paper"], points, trial=1)
     trellis.figure_.savefig(output / "figure_2.png", dpi=100)
     draw_third_figure(points, synchronised, model).savefig(output / "figure_3.png", dpi=100)
     pipe = make_pipeline(cosines, aspace, methods["paper"], model)

@@ -1,6 +1,6 @@
 """Partitions in, partitions out, on a Dask cluster: the model is sent to every worker once.
 
-    python stream_dask.py model.joblib performances/ synchronized/ --scheduler tcp://head:8786
+    python stream_dask.py model.joblib trials/ synchronized/ --scheduler tcp://head:8786
 
 reads portions here, sends each to one worker, and writes what comes back: files, restarts and
 promises are those of ``stream_files.py``, but that it stops at a portion that is refused.
@@ -39,19 +39,19 @@ def give(client, model, name="model"):
     client.register_plugin(Fitted(model), name=name)
 
 
-def on_worker(performances, method="transform", model="model"):
-    """What the model that a worker was given under this name says of performances.
+def on_worker(trials, method="transform", model="model"):
+    """What the model that a worker was given under this name says of trials.
 
     Partitions of bags may be iterators, and of those that are filtered some may be empty.
     """
     fitted = get_worker().plugins.get(model)
     if fitted is None:
         raise ValueError(f"The workers were given no {model!r}: give(client, fitted, {model!r}).")
-    if hasattr(performances, "__next__"):
-        performances = list(performances)
-    if isinstance(performances, list) and not performances:
+    if hasattr(trials, "__next__"):
+        trials = list(trials)
+    if isinstance(trials, list) and not trials:
         return []
-    return stream_files.answer(fitted.model, method, performances)
+    return stream_files.answer(fitted.model, method, trials)
 
 
 def stream(client, portions, method="transform", model="model"):

@@ -1,9 +1,9 @@
-"""Any number of performances, from files to files, whatever is killed on the way.
+"""Any number of trials, from files to files, whatever is killed on the way.
 
-    python stream_files.py model.joblib performances/ synchronized/ --n-jobs 8
+    python stream_files.py model.joblib trials/ synchronized/ --n-jobs 8
 
-A file of the first folder is a portion: ``.npy`` an array (n_performances, n_frames, n_features),
-``.npz`` one array (n_frames, n_features) a performance, in the order in which they were saved. What
+A file of the first folder is a portion: ``.npy`` an array (n_trials, n_frames, n_features),
+``.npz`` one array (n_frames, n_features) a trial, in the order in which they were saved. What
 the model answers goes into a file of the same name in the second: ``transform`` and
 ``score_samples`` into an ``.npy``, times and distances of ``match`` into an ``.npz``.
 
@@ -33,7 +33,7 @@ import pandas as pd
 import scipy
 import sklearn
 import sklearn_motionsync
-from sklearn_motionsync import Match, to_sequences
+from sklearn_motionsync import Match, to_trials
 
 METHODS = ("transform", "match", "score_samples")
 
@@ -46,7 +46,7 @@ def stream(model, portions, results, method="transform", n_jobs=None):
     model : path
         A fitted estimator or pipeline, written by `joblib.dump`.
     portions : path
-        The folder of performances.
+        The folder of trials.
     results : path
         The folder of results; made if there is none. One run at a time works on it.
     method : {"transform", "match", "score_samples"}, default="transform"
@@ -88,23 +88,23 @@ def answer_file(model, digest, method, source, target):
     return None
 
 
-def answer(model, method, performances):
-    """What a model says of performances, on this core alone."""
+def answer(model, method, trials):
+    """What a model says of trials, on this core alone."""
     with joblib.parallel_config(backend="sequential"):
         if method == "match":
-            match = Match.from_estimator(model, performances)
+            match = Match.from_estimator(model, trials)
             return {"times": match.times, "distances": match.distances}
-        return as_array(getattr(model, method)(performances))
+        return as_array(getattr(model, method)(trials))
 
 
 def as_array(found):
     """Answers as one array, also if the model gives tables (``set_output``)."""
     if isinstance(found, pd.DataFrame):
         many = found.index.nlevels > 1
-        found = [x.to_numpy() for x in to_sequences(found)] if many else found.to_numpy()
+        found = [x.to_numpy() for x in to_trials(found)] if many else found.to_numpy()
     if isinstance(found, list) and len({len(x) for x in found}) > 1:
         raise ValueError(
-            "What the model makes of performances has different lengths: give one that has a "
+            "What the model makes of trials has different lengths: give one that has a "
             "synchronizer."
         )
     return np.asarray(found)
@@ -128,7 +128,7 @@ def loaded(path, digest):
 
 
 def read(source):
-    """The performances of a portion; those of an ``.npy`` stay on the disk until they are used."""
+    """The trials of a portion; those of an ``.npy`` stay on the disk until they are used."""
     try:
         if Path(source).suffix == ".npy":
             return np.load(source, mmap_mode="r")

@@ -23,7 +23,7 @@ from .comparison.groups import GroupComparison, compare_groups
 from .comparison.norm import NormComparison, compare_to_norm
 from .gait.events import gait_events
 from .gait.parameters import gait_parameters
-from .inputs.long_tables import to_frame, to_sequences
+from .inputs.long_tables import to_frame, to_trials
 from .model.action_model import ActionModel
 from .model.departures import find_departures
 from .model.detector import ActionDetector
@@ -35,10 +35,10 @@ from .recognition import ActionClassifier, synchronization_distances
 from .report.player import write_player
 from .report.report import write_report
 from .segmentation.cycles import CycleSegmenter
-from .segmentation.search import find_performances
+from .segmentation.search import find_trials
 from .segmentation.self_correlation import self_correlation
 from .synchronizers.base import Synchronizer
-from .synchronizers.blending import blend_performances
+from .synchronizers.blending import blend_trials
 from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.learning import SynchronizationWarning
 from .synchronizers.linear import LinearSynchronizer
@@ -73,14 +73,14 @@ __all__ = [
     "Synchronizer",
     "TimingChannel",
     "Track",
-    "blend_performances",
+    "blend_trials",
     "compare_events",
     "compare_groups",
     "compare_to_norm",
     "datasets",
     "display",
     "find_departures",
-    "find_performances",
+    "find_trials",
     "gait_events",
     "gait_parameters",
     "io",
@@ -89,7 +89,7 @@ __all__ = [
     "self_correlation",
     "synchronization_distances",
     "to_frame",
-    "to_sequences",
+    "to_trials",
     "write_player",
     "write_report",
 ]

@@ -10,7 +10,7 @@ os.environ.setdefault("SCIPY_ARRAY_API", "1")
 import numpy as np
 import pytest
 from sklearn_motionsync import ASpace, DirectionCosines
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 REAL_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -35,7 +35,7 @@ def benchmark():
 @pytest.fixture(scope="session")
 def bends(real_data):
     """The 24 real bends of four actors: joint positions."""
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     chosen = np.flatnonzero(bunch.target == "depositFloorR")
     bunch.data = [bunch.data[i] for i in chosen]
     for name in ("target", "actor", "take", "frame_rate"):
@@ -50,6 +50,6 @@ def bending():
 
 @pytest.fixture(scope="session")
 def bending_aspace(bending):
-    """The bending performances as points of their aSpace."""
-    postures = DirectionCosines(bending.skeleton).fit_transform(bending.data)
-    return ASpace().fit_transform(postures)
+    """The bending trials as points of their aSpace."""
+    poses = DirectionCosines(bending.skeleton).fit_transform(bending.data)
+    return ASpace().fit_transform(poses)

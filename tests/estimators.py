@@ -91,7 +91,7 @@ SYNCHRONIZERS = all_of(
 )
 # Their width is fixed by their skeleton.
 BODY = all_of("DirectionCosines", "JointPositions")
-# They take long recordings of a movement that repeats, not performances.
+# They take long recordings of a movement that repeats, not trials.
 OF_TAKES = all_of("CycleSegmenter")
 EVERY = all_of(*INSTANCES)
 ESTIMATORS = [e for e in EVERY if e not in OF_TAKES]
@@ -110,8 +110,8 @@ def by_name(value):
     return type(value).__name__ if hasattr(value, "get_params") else None
 
 
-def make_performances(n, n_frames=30):
-    """Performances of 15 joints, of equal length."""
+def make_trials(n, n_frames=30):
+    """Trials of 15 joints, of equal length."""
     rng = np.random.RandomState(0)
     t = np.linspace(0, 1, n_frames)[:, np.newaxis]
     base = rng.uniform(-1, 1, (1, WIDTH)) + np.sin(2 * t + rng.uniform(0, 6, (1, WIDTH)))
@@ -122,11 +122,11 @@ def data_for(estimator):
     """What an instance can be fitted on."""
     if estimator in OF_TAKES:
         return make_gait(2, n_cycles=4, takes=True, random_state=0).data
-    return make_performances(6)
+    return make_trials(6)
 
 
 def outputs(estimator, X):
-    """All results of a fitted estimator for performances, or takes, as a list of plain arrays."""
+    """All results of a fitted estimator for trials, or takes, as a list of plain arrays."""
     results = []
     if hasattr(estimator, "transform"):
         results += [np.asarray(x) for x in estimator.transform(X)]
@@ -136,8 +136,8 @@ def outputs(estimator, X):
         results += list(zip(*estimator.track(X), strict=True))
     if isinstance(estimator, MotionTracker):
         # A tracker also takes single frames and gaps: what it is given here is checked before.
-        tracks = estimator.track([x[::4] for x in estimator.check_performances(X)])
-        results += [np.stack([track.postures for track in tracks])]
+        tracks = estimator.track([x[::4] for x in estimator.check_trials(X)])
+        results += [np.stack([track.poses for track in tracks])]
     if hasattr(estimator, "score_samples"):
         results += [estimator.score_samples(X), estimator.decision_function(X)]
         results += [estimator.predict(X)]

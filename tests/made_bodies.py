@@ -16,7 +16,7 @@ def moved(positions, shift):
 
 
 def standing(**moves):
-    """One posture in metres, facing z: standing straight, arms down, joints moved as given."""
+    """One pose in metres, facing z: standing straight, arms down, joints moved as given."""
     at = {
         "pelvis": (0, 1, 0),
         "neck": (0, 1.5, 0),

@@ -8,12 +8,12 @@ import numpy as np
 # Of every cost of the package: b, g and phi of a step at the local rate rho, as in docs/method.md,
 # and the features, given positions a frame and the width of the filter in positions.
 STEP_WEIGHTS = {
-    "posture": lambda rho: (1.0, 2.0, abs(rho - 1)),
+    "pose": lambda rho: (1.0, 2.0, abs(rho - 1)),
     "velocity": lambda rho: ((0.8 + 0.2 * rho) ** 2, 1.6 + 0.4 * rho, (rho - 1) ** 2),
     "elastic": lambda rho: (rho, 2 * rho**0.5, (rho - 1) ** 2),
 }
 FEATURES = {
-    "posture": lambda x, pace, sigma: x,
+    "pose": lambda x, pace, sigma: x,
     "velocity": lambda x, pace, sigma: pace * slow_filter(x, sigma, 1),
     "elastic": lambda x, pace, sigma: slow_roots(pace * slow_filter(x, sigma, 1)),
 }

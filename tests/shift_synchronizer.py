@@ -5,7 +5,7 @@ from sklearn_motionsync import Match, Synchronizer
 
 
 class ShiftSynchronizer(Synchronizer):
-    """Shifts each performance to where it correlates best with the pattern."""
+    """Shifts each trial to where it correlates best with the pattern."""
 
     def match(self, X):
         on_clock, frames = self.normalize(X), np.arange(self.n_frames_)

@@ -26,7 +26,7 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     Skeleton,
     to_frame,
-    to_sequences,
+    to_trials,
 )
 
 from estimators import (
@@ -42,14 +42,14 @@ from estimators import (
     all_of,
     by_name,
     data_for,
-    make_performances,
+    make_trials,
     outputs,
     public_estimators,
 )
 from shift_synchronizer import ShiftSynchronizer
 
 # One cost: the interface is that of all three, which take three times as long.
-WITH_ONE_COST = ActionClassifier(costs=["posture"], n_landmarks=30, n_frames=3)
+WITH_ONE_COST = ActionClassifier(costs=["pose"], n_landmarks=30, n_frames=3)
 # FrameWise is as wide as its transformer: tests/transformers/test_framewise.py checks several.
 # The instances of TimingChannel have the same interface, of which one is enough.
 OTHERWISE = [*BODY, *all_of("FrameWise", "ActionClassifier"), *INSTANCES["TimingChannel"][1:]]
@@ -107,9 +107,9 @@ def test_scikit_learn_checks_that_are_not_in_the_automatic_list(estimator, name)
 
 
 @pytest.fixture(scope="module")
-def performances():
-    """Six performances of equal length, so that they can be a 3-D array, and a model's input."""
-    return make_performances(6)
+def trials():
+    """Six trials of equal length, so that they can be a 3-D array, and a model's input."""
+    return make_trials(6)
 
 
 KINDS = {
@@ -170,8 +170,8 @@ def expected_of(estimator):
     ],
     ids=by_name,
 )
-def test_every_kind_of_collection_gives_equal_results(estimator, kind, performances):
-    X = KINDS[kind](performances)
+def test_every_kind_of_collection_gives_equal_results(estimator, kind, trials):
+    X = KINDS[kind](trials)
     fitted = clone(estimator).fit(X)
     assert_same(outputs(fitted, X), expected_of(estimator))
     assert fitted.n_features_in_ == WIDTH
@@ -232,14 +232,14 @@ def test_a_stored_estimator_gives_equal_results(estimator):
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_subsets_and_order_do_not_matter(estimator, performances):
-    """The results of a performance depend on no other performance."""
+def test_subsets_and_order_do_not_matter(estimator, trials):
+    """The results of a trial depend on no other trial."""
     fitted, whole = fit_once(estimator), expected_of(estimator)
-    last = outputs(fitted, performances[-1:])
-    backwards = outputs(fitted, performances[::-1])
+    last = outputs(fitted, trials[-1:])
+    backwards = outputs(fitted, trials[::-1])
     if hasattr(estimator, "transform"):
-        np.testing.assert_allclose(last[0], whole[len(performances) - 1], rtol=1e-12)
-        np.testing.assert_allclose(backwards[0], whole[len(performances) - 1], rtol=1e-12)
+        np.testing.assert_allclose(last[0], whole[len(trials) - 1], rtol=1e-12)
+        np.testing.assert_allclose(backwards[0], whole[len(trials) - 1], rtol=1e-12)
     else:
         np.testing.assert_allclose(last[0][0], whole[0][-1], rtol=1e-12)
         for one, same in zip(backwards[0], whole[0][::-1], strict=True):
@@ -247,19 +247,19 @@ def test_subsets_and_order_do_not_matter(estimator, performances):
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
-def test_transform_returns_new_arrays_of_the_kind_of_its_input(estimator, performances):
+def test_transform_returns_new_arrays_of_the_kind_of_its_input(estimator, trials):
     fitted = fit_once(estimator)
-    stacked = fitted.transform(np.stack(performances))
+    stacked = fitted.transform(np.stack(trials))
     assert isinstance(stacked, np.ndarray)
     assert stacked.ndim == 3
-    out = fitted.transform(performances)
-    assert_same(clone(estimator).fit_transform(performances), out)
-    assert not any(np.shares_memory(one, x) for one in out for x in performances)
+    out = fitted.transform(trials)
+    assert_same(clone(estimator).fit_transform(trials), out)
+    assert not any(np.shares_memory(one, x) for one in out for x in trials)
     if hasattr(fitted, "n_frames_"):
         assert out.shape == (6, fitted.n_frames_, len(fitted.get_feature_names_out()))
     else:
         assert isinstance(out, list)
-        np.testing.assert_allclose(fitted.transform(performances[0]), out[0], rtol=1e-12)
+        np.testing.assert_allclose(fitted.transform(trials[0]), out[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -272,9 +272,9 @@ def test_transform_returns_new_arrays_of_the_kind_of_its_input(estimator, perfor
     ],
     ids=by_name,
 )
-def test_float32_is_kept_and_other_types_become_float64(estimator, dtype, performances):
+def test_float32_is_kept_and_other_types_become_float64(estimator, dtype, trials):
     used = "float32" if dtype == "float32" else "float64"
-    X = [x > 0 if dtype == "bool" else (100 * x).astype(dtype) for x in performances]
+    X = [x > 0 if dtype == "bool" else (100 * x).astype(dtype) for x in trials]
     fitted = clone(estimator).fit(X)
     for name in ("components_", "mean_", "pattern_", "variance_", "limb_lengths_"):
         if hasattr(fitted, name):
@@ -290,13 +290,13 @@ def test_float32_is_kept_and_other_types_become_float64(estimator, dtype, perfor
 
 @pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=by_name)
 @pytest.mark.parametrize("pattern", ["median", 0, 3])
-def test_pattern_matches_itself_by_the_identity(estimator, pattern, performances, request):
+def test_pattern_matches_itself_by_the_identity(estimator, pattern, trials, request):
     """Frame by frame: synthetic ones, those that never move, and people."""
     still = [np.full((12, 2), k) for k in range(5)]
     people = request.getfixturevalue("bends").data[::3] if pattern == "median" else []
     # A cross-correlation finds no shift of what never moves.
     others = [] if isinstance(estimator, ShiftSynchronizer) else [still]
-    for X in (performances, *([people] if people else []), *others):
+    for X in (trials, *([people] if people else []), *others):
         name = "pattern" if "pattern" in estimator.get_params() else "synchronizer__pattern"
         sync = clone(estimator).set_params(**{name: pattern}).fit(X)
         own = sync.match([X[sync.pattern_index_]]).times[0]
@@ -308,37 +308,37 @@ def test_pattern_matches_itself_by_the_identity(estimator, pattern, performances
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
 @pytest.mark.parametrize(("kind", "setting"), [("list", "local"), ("multiindex", "global")])
-def test_pandas_output_of_collections(estimator, kind, setting, performances):
-    X = KINDS[kind](performances)
-    plain, estimator = fit_once(estimator).transform(performances), clone(estimator)
+def test_pandas_output_of_collections(estimator, kind, setting, trials):
+    X = KINDS[kind](trials)
+    plain, estimator = fit_once(estimator).transform(trials), clone(estimator)
     if setting == "local":
         out = estimator.set_output(transform="pandas").fit_transform(X)
     else:
         with config_context(transform_output="pandas"):
             out = estimator.fit_transform(X)
     assert isinstance(out, pd.DataFrame)
-    assert out.index.names == ["performance", "frame"]
+    assert out.index.names == ["trial", "frame"]
     assert list(out.columns) == list(estimator.get_feature_names_out())
-    for frame, expected in zip(to_sequences(out), plain, strict=True):
+    for frame, expected in zip(to_trials(out), plain, strict=True):
         np.testing.assert_array_equal(frame, expected)
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
-def test_names_of_input_features_are_one_each(estimator, performances):
-    fitted, n = fit_once(estimator), performances[0].shape[1]
+def test_names_of_input_features_are_one_each(estimator, trials):
+    fitted, n = fit_once(estimator), trials[0].shape[1]
     with pytest.raises(ValueError, match=f"must name every feature once, but 'zz' comes {n} times"):
         fitted.get_feature_names_out(["zz"] * n)
     with pytest.raises(ValueError, match="input_features should have length equal"):
         fitted.get_feature_names_out(["zz"])
     assert len(fitted.get_feature_names_out([f"c{k}" for k in range(n)]))
-    named = clone(estimator).fit([pd.DataFrame(x, columns=NAMES) for x in performances])
+    named = clone(estimator).fit([pd.DataFrame(x, columns=NAMES) for x in trials])
     with pytest.raises(ValueError, match="input_features is not equal to feature_names_in_"):
         named.get_feature_names_out([f"c{k}" for k in range(n)])
 
 
-def test_pandas_output_keeps_what_levels_are_called(performances):
-    X = to_frame(performances, columns=NAMES).rename_axis(["trial", "sample"])
-    frames = [df.rename_axis("sample") for df in to_sequences(X)]
+def test_pandas_output_keeps_what_levels_are_called(trials):
+    X = to_frame(trials, columns=NAMES).rename_axis(["trial", "sample"])
+    frames = [df.rename_axis("sample") for df in to_trials(X)]
     for estimator in (ASpace(2), LinearSynchronizer(20)):
         pandas = clone(estimator).set_output(transform="pandas")
         # Frames of a clock are no samples of a trial.
@@ -347,20 +347,20 @@ def test_pandas_output_keeps_what_levels_are_called(performances):
         assert pandas.fit_transform(frames).index.names == ["trial", last]
 
 
-def test_inverse_transform_takes_pandas_output(performances):
+def test_inverse_transform_takes_pandas_output(trials):
     """Warnings are errors here."""
     for estimator in (ASpace(2), DirectionCosines(Skeleton.paper())):
-        fitted = clone(estimator).fit(performances)
-        expected = np.concatenate(fitted.inverse_transform(fitted.transform(performances)))
+        fitted = clone(estimator).fit(trials)
+        expected = np.concatenate(fitted.inverse_transform(fitted.transform(trials)))
         fitted.set_output(transform="pandas")
-        points = fitted.transform(performances)
+        points = fitted.transform(trials)
         np.testing.assert_array_equal(fitted.inverse_transform(points), expected)
         with pytest.raises(ValueError, match="should match"):
             fitted.inverse_transform(points[points.columns[::-1]])
 
 
-def test_pandas_output_keeps_the_labels(performances):
-    X = to_frame(performances, performances=list("abcdef"), columns=NAMES)
+def test_pandas_output_keeps_the_labels(trials):
+    X = to_frame(trials, trials=list("abcdef"), columns=NAMES)
     out = ASpace(2).set_output(transform="pandas").fit_transform(X)
     assert out.index.equals(X.index)
     out = DenseSynchronizer(n_frames=20).set_output(transform="pandas").fit_transform(X)
@@ -369,19 +369,19 @@ def test_pandas_output_keeps_the_labels(performances):
 
 
 @pytest.mark.parametrize("estimator", BODY, ids=by_name)
-def test_pandas_through_a_pipeline(estimator, performances):
+def test_pandas_through_a_pipeline(estimator, trials):
     pipe = make_pipeline(clone(estimator), ASpace(), DenseSynchronizer(), ActionModel())
-    plain = clone(pipe).fit(performances).score_samples(performances)
+    plain = clone(pipe).fit(trials).score_samples(trials)
     with config_context(transform_output="pandas"):
-        framed = clone(pipe).fit(performances).score_samples(performances)
+        framed = clone(pipe).fit(trials).score_samples(trials)
     np.testing.assert_array_equal(plain, framed)
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
-def test_polars_output_of_a_collection_is_refused(estimator, performances):
-    fitted = clone(estimator).fit(performances).set_output(transform="polars")
+def test_polars_output_of_a_collection_is_refused(estimator, trials):
+    fitted = clone(estimator).fit(trials).set_output(transform="polars")
     with pytest.raises(ValueError, match="'polars'") as caught:
-        fitted.transform(performances)
+        fitted.transform(trials)
     for word in ("pl.DataFrame(", "'pandas'"):
         assert word in str(caught.value)
 
@@ -407,22 +407,22 @@ def put(value):
 FOLLOWING = all_of("OnlineSynchronizer")
 # What else is refused, tests/inputs/test_bad_inputs.py tries on an estimator of each kind.
 BAD = {
-    "NaN": (put(np.nan), r"Performance 4, frame [23], feature 2 is NaN"),
-    "infinity": (put(np.inf), r"Performance 4, frame 3, feature 2 is infinity"),
-    "one frame": (lambda x: x[:1], r"Performance 4 has shape \(1, 45\), .* at least 2 frames"),
-    "wrong width": (lambda x: x[:, 1:], r"Performance 4 has 44 features .* performance 0 has 45"),
+    "NaN": (put(np.nan), r"Trial 4, frame [23], feature 2 is NaN"),
+    "infinity": (put(np.inf), r"Trial 4, frame 3, feature 2 is infinity"),
+    "one frame": (lambda x: x[:1], r"Trial 4 has shape \(1, 45\), .* at least 2 frames"),
+    "wrong width": (lambda x: x[:, 1:], r"Trial 4 has 44 features .* trial 0 has 45"),
 }
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
 @pytest.mark.parametrize("fault", BAD)
 @pytest.mark.parametrize("when", ["fit", "after"])
-def test_bad_performance_is_refused_by_its_index(estimator, fault, when, performances):
+def test_bad_trial_is_refused_by_its_index(estimator, fault, when, trials):
     change, message = BAD[fault]
-    bad = with_bad(performances, 4, change)
+    bad = with_bad(trials, 4, change)
     takes_gaps = get_tags(estimator).input_tags.allow_nan
     if fault == "NaN" and (takes_gaps or (when == "after" and estimator in FOLLOWING)):
-        # What was not seen; the other performances are as without it.
+        # What was not seen; the other trials are as without it.
         fitted = clone(estimator).fit(bad) if when == "fit" else fit_once(estimator)
         np.testing.assert_array_equal(outputs(fitted, bad)[0][0], outputs(fitted, bad[:1])[0][0])
         return
@@ -432,42 +432,42 @@ def test_bad_performance_is_refused_by_its_index(estimator, fault, when, perform
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
 def test_other_kinds_of_input_are_refused(estimator):
-    for X, message in (([], "0 performances"), ({"a": np.zeros((3, WIDTH))}, "got dict")):
+    for X, message in (([], "0 trials"), ({"a": np.zeros((3, WIDTH))}, "got dict")):
         with pytest.raises(ValueError, match=message):
             clone(estimator).fit(X)
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_wrong_width_is_refused(estimator, performances):
+def test_wrong_width_is_refused(estimator, trials):
     fitted = fit_once(estimator)
-    with pytest.raises(ValueError, match=r"Performance 0 has 42 features a frame.*expecting 45"):
-        outputs(fitted, [x[:, 3:] for x in performances])
+    with pytest.raises(ValueError, match=r"Trial 0 has 42 features a frame.*expecting 45"):
+        outputs(fitted, [x[:, 3:] for x in trials])
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_other_feature_names_are_refused(estimator, performances):
-    frames = KINDS["frames"](performances)
+def test_other_feature_names_are_refused(estimator, trials):
+    frames = KINDS["frames"](trials)
     fitted = clone(estimator).fit(frames)
     with pytest.raises(ValueError, match="feature names should match"):
         outputs(fitted, [x.add_prefix("other ") for x in frames])
 
 
 @pytest.mark.parametrize("estimator", SEQUENCE_LEVEL, ids=by_name)
-def test_sequence_level_estimators_keep_to_the_kind_of_fit(estimator, performances):
-    fitted = clone(estimator).fit(performances)
+def test_sequence_level_estimators_keep_to_the_kind_of_fit(estimator, trials):
+    fitted = clone(estimator).fit(trials)
     with pytest.raises(ValueError, match=r"wrap one sequence as \[X\]"):
-        outputs(fitted, performances[0])
-    rows = np.stack([x[:, 0] for x in performances])
+        outputs(fitted, trials[0])
+    rows = np.stack([x[:, 0] for x in trials])
     fitted.fit(rows)
     assert fitted.n_features_in_ == 30
     with pytest.raises(ValueError, match="was fitted on a 2-D array"):
-        outputs(fitted, performances)
+        outputs(fitted, trials)
 
 
 @pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=by_name)
-def test_rows_are_univariate_sequences(estimator, performances):
-    rows = np.stack([x[:, 0] for x in performances])
-    columns = [x[:, :1] for x in performances]
+def test_rows_are_univariate_sequences(estimator, trials):
+    rows = np.stack([x[:, 0] for x in trials])
+    columns = [x[:, :1] for x in trials]
     expected = clone(estimator).fit(columns).transform(columns)[:, :, 0]
     np.testing.assert_array_equal(clone(estimator).fit(rows).transform(rows), expected)
 
@@ -484,13 +484,13 @@ TOO_LITTLE = {
     **dict.fromkeys(
         ["DirectionCosines", "JointPositions"], (lambda X: [0 * x for x in X], "has no length")
     ),
-    "ASpace": (lambda X: X[0][:1], "at least 2 postures"),
+    "ASpace": (lambda X: X[0][:1], "at least 2 poses"),
     "FrameWise": (lambda X: X[0][:1], "n_components=2 must be between"),
     **dict.fromkeys(
         ["ActionModel", "ActionDetector", "MotionTracker"], (lambda X: X[:1], "at least 2 perf")
     ),
     "ActionClassifier": (lambda X: X[:1], "at least 2 classes"),
-    "CycleSegmenter": (lambda X: [x[:40] for x in X], "Performance 0: "),
+    "CycleSegmenter": (lambda X: [x[:40] for x in X], "Trial 0: "),
 }
 FAILURES = [
     (estimator, *failure)
@@ -523,8 +523,8 @@ def test_a_fit_that_fails_leaves_the_earlier_fit_or_none(estimator, spoil, messa
         *((JointPositions, reference, 42) for reference in ("heading", "world")),
     ],
 )
-def test_body_estimators_follow_scikit_learn_on_rows(kind, reference, width, performances):
-    X = performances[0]
+def test_body_estimators_follow_scikit_learn_on_rows(kind, reference, width, trials):
+    X = trials[0]
     estimator = kind(Skeleton.paper(), reference)
     params = estimator.get_params()
     assert estimator.fit(X) is estimator
@@ -557,7 +557,7 @@ def test_body_estimators_follow_scikit_learn_on_rows(kind, reference, width, per
         (JointPositions, {"reference": "parent"}),
     ],
 )
-def test_body_estimators_validate_parameters(kind, params, performances):
+def test_body_estimators_validate_parameters(kind, params, trials):
     estimator = kind(Skeleton.paper()).set_params(**params)
     with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
-        estimator.fit(performances)
+        estimator.fit(trials)

@@ -18,7 +18,7 @@ from sklearn_motionsync import (
     FrameWise,
     LinearSynchronizer,
     Match,
-    blend_performances,
+    blend_trials,
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.io import fill_gaps
@@ -51,7 +51,7 @@ def test_a_classifier_names_the_step_that_takes_gaps(bunch, gaps):
         DirectionCosines(bunch.skeleton, hidden="nan"),
         ActionClassifier(n_frames=20),
     )
-    message = r"Performance 1, frame 10, .* is NaN.*Put ASpace\(1\.0\) before it"
+    message = r"Trial 1, frame 10, .* is NaN.*Put ASpace\(1\.0\) before it"
     with pytest.raises(ValueError, match=message):
         make_pipeline(cosines, classifier).fit(X, y)
     pipe = make_pipeline(cosines, ASpace(1.0), classifier).fit(X, y)
@@ -61,9 +61,7 @@ def test_a_classifier_names_the_step_that_takes_gaps(bunch, gaps):
 def test_a_segmenter_names_the_call_that_fills_gaps():
     takes = make_gait(2, n_cycles=5, takes=True, random_state=0).data
     takes[1][100:104, 2] = np.nan
-    with pytest.raises(
-        ValueError, match=r"Performance 1, frame 100, .* NaN.*fill_gaps\(x, max_gap"
-    ):
+    with pytest.raises(ValueError, match=r"Trial 1, frame 100, .* NaN.*fill_gaps\(x, max_gap"):
         CycleSegmenter(start=0).fit(takes)
     takes = ASpace(1.0).fit_transform(takes)
     assert len(CycleSegmenter().fit(takes).segment(takes)[0]) == 10
@@ -74,11 +72,9 @@ def test_blends_name_the_call_that_fills_gaps(bunch, gaps):
     pipe = make_pipeline(DirectionCosines(bunch.skeleton), LinearSynchronizer(50)).fit(whole)
     weights = {0: 0.5, 1: 0.5}
     for estimator in (pipe, Match.from_estimator(pipe, whole)):
-        with pytest.raises(
-            ValueError, match=r"Performance 1, frame 10, .* NaN.*fill_gaps\(x, max_g"
-        ):
-            blend_performances(estimator, gaps, weights, skeleton=bunch.skeleton)
-    assert np.isfinite(blend_performances(pipe, whole, weights)).all()
+        with pytest.raises(ValueError, match=r"Trial 1, frame 10, .* NaN.*fill_gaps\(x, max_g"):
+            blend_trials(estimator, gaps, weights, skeleton=bunch.skeleton)
+    assert np.isfinite(blend_trials(pipe, whole, weights)).all()
 
 
 @pytest.mark.parametrize("hidden", ["raise", "nan"])
@@ -88,7 +84,7 @@ def test_a_detector_takes_what_its_pipeline_takes(hidden, bunch, gaps):
     detector = ActionDetector(pipe)
     assert get_tags(detector).input_tags.allow_nan is (hidden == "nan")
     if hidden == "raise":
-        with pytest.raises(ValueError, match=r"Performance 1, frame 10, .* is NaN"):
+        with pytest.raises(ValueError, match=r"Trial 1, frame 10, .* is NaN"):
             detector.fit(gaps)
         return
     detector.fit(gaps, groups=bunch.actor)

@@ -10,9 +10,9 @@ from sklearn_motionsync import (
     ASpace,
     CycleSegmenter,
     Match,
-    blend_performances,
-    find_performances,
-    to_sequences,
+    blend_trials,
+    find_trials,
+    to_trials,
 )
 from sklearn_motionsync.io import cut_at_events
 from sklearn_motionsync.online.members import weighted_median
@@ -40,7 +40,7 @@ def test_blend_of_half_a_frame_has_one_length(lengths, expected, seed):
     clock = shaken(np.arange(61.0), seed)
     clock[[0, -1]] = 0, 60
     match = Match(np.tile(clock, (2, 1)))
-    assert len(blend_performances(match, list(map(curve, lengths)), [0.5, 0.5])) == expected
+    assert len(blend_trials(match, list(map(curve, lengths)), [0.5, 0.5])) == expected
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -50,7 +50,7 @@ def test_resampled_recordings_have_one_length(rate, expected, seed):
     times = np.append(np.arange(12.0), 12.5 if rate is None else 12.0)
     times = shaken(times, seed) if rate is None else times
     df = pd.DataFrame({"t": times, "x": np.sin(times)})
-    (found,) = to_sequences(df, time="t", frame_rate=rate)
+    (found,) = to_trials(df, time="t", frame_rate=rate)
     assert len(found) == expected + (rate is None)
 
 
@@ -87,7 +87,7 @@ def test_of_copies_of_an_action_the_first_is_found(seed):
     action, rest = np.sin(np.linspace(0, np.pi, 40))[:, np.newaxis] ** 2, np.zeros((25, 1))
     copy = action + 0.1 * action**3
     take = np.concatenate([rest, copy, rest, copy, rest, copy, rest])
-    _, found = find_performances(action, shaken(take, seed), max_hits=1)
+    _, found = find_trials(action, shaken(take, seed), max_hits=1)
     assert 20 <= found["start"].item() <= 30
 
 

@@ -40,7 +40,7 @@ def make_pipe(skeleton, synchronizer=None):
 
 @pytest.fixture(params=["bending", "bends"])
 def people(request):
-    """A list of performances of unequal length: synthetic, and real."""
+    """A list of trials of unequal length: synthetic, and real."""
     bunch = request.getfixturevalue(request.param)
     assert isinstance(bunch.data, list)
     assert len({len(x) for x in bunch.data}) > 10
@@ -63,7 +63,7 @@ def test_grid_search(bends):
 
 
 def test_dense_beats_linear_on_held_out_actors(bends):
-    """Synchronised performances of new people are more probable under the model."""
+    """Synchronised trials of new people are more probable under the model."""
 
     def score(synchronizer):
         pipe = make_pipe(bends.skeleton, synchronizer)
@@ -74,9 +74,9 @@ def test_dense_beats_linear_on_held_out_actors(bends):
 
 
 def test_model_scores_another_action_lower(bends, real_data):
-    from sklearn_motionsync.datasets import load_performances
+    from sklearn_motionsync.datasets import load_trials
 
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     others = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t.startswith("hop")]
     pipe = make_pipe(bends.skeleton).fit(bends.data)
     assert pipe.score_samples(others).max() < pipe.score_samples(bends.data).min()
@@ -97,7 +97,7 @@ def nestings(skeleton, synchronizer):
     search = GridSearchCV(synchronizer, {"n_frames": [40]}, cv=2, scoring=SpreadScorer())
     return {
         "flat": make_pipeline(*steps),
-        "postures inside": make_pipeline(make_pipeline(cosines, aspace), *steps[2:]),
+        "poses inside": make_pipeline(make_pipeline(cosines, aspace), *steps[2:]),
         "deep": make_pipeline(make_pipeline(cosines, make_pipeline(aspace, *steps[2:]))),
         "nothing between": make_pipeline(
             cosines,
@@ -123,7 +123,7 @@ def said_of(pipe, X):
     scores = [scorer(pipe, X) for scorer in (SpreadScorer(), FeatureHoldoutScorer())]
     model = ActionModelDisplay.from_estimator(pipe, X, features="pelvis_height")
     times, share = Match.from_estimator(pipe, X).times, MetricDisplay.from_estimator(pipe).share
-    return [scores, times, share, model.performances]
+    return [scores, times, share, model.trials]
 
 
 @pytest.mark.parametrize("name", NESTINGS)
@@ -150,7 +150,7 @@ def test_absent_step_of_a_nested_pipeline_is_refused(few):
         SpreadScorer()(nestings(few.skeleton, DenseSynchronizer(40))["deep"], few.data)
 
 
-# -- key-frames along with performances -------------------------------------------------
+# -- key-frames along with trials -------------------------------------------------
 
 
 def make_marked(bunch, *, nested):
@@ -165,7 +165,7 @@ def make_marked(bunch, *, nested):
         return pipe.fit(bunch.data, keyframes=bunch.keyframes)
 
 
-# Whoever takes a pipeline and performances, with whatever goes along with these.
+# Whoever takes a pipeline and trials, with whatever goes along with these.
 OF_PIPELINES = {
     "Match": Match.from_estimator,
     "SynchronizationDisplay": SynchronizationDisplay.from_estimator,
@@ -192,7 +192,7 @@ def test_displays_and_scorers_take_key_frames(nested, routing, few):
     np.testing.assert_array_equal(display.match.times, expected.times)
     after = sync.transform(points, keyframes=K)[:, :, :1]
     np.testing.assert_array_equal(display.after, after)
-    np.testing.assert_array_equal(model.performances, after)
+    np.testing.assert_array_equal(model.trials, after)
     assert len(people.axes_) == 2
 
 
@@ -223,7 +223,7 @@ def test_none_is_accepted_for_any_parameter(few):
 
 
 def test_model_without_a_synchronizer_refuses_key_frames(few):
-    with pytest.raises(TypeError, match="keyframes along with performances X only"):
+    with pytest.raises(TypeError, match="keyframes along with trials X only"):
         ActionModelDisplay.from_estimator(make_marked(few, nested=False), keyframes=few.keyframes)
 
 
@@ -234,8 +234,8 @@ def test_key_frames_reach_a_step_before_the_synchronizer(few):
     steps = LinearSynchronizer(40), DenseSynchronizer(30)
     pipe = make_pipeline(*steps).fit(points, linearsynchronizer__keyframes=K)
     marked = steps[0].transform(points, keyframes=K)
-    display = TrellisDisplay.from_estimator(pipe, points, performance=2, keyframes=K)
-    expected = TrellisDisplay.from_estimator(steps[1], marked, performance=2)
+    display = TrellisDisplay.from_estimator(pipe, points, trial=2, keyframes=K)
+    expected = TrellisDisplay.from_estimator(steps[1], marked, trial=2)
     np.testing.assert_array_equal(display.space.costs, expected.space.costs)
     message = r"TrellisDisplay.from_estimator\(estimator, X, keyframes="
     with pytest.raises(ValueError, match=message):
@@ -253,7 +253,7 @@ def run_example(monkeypatch, capsys, *arguments):
 
 
 def assert_figures(folder):
-    for name in ("bending_dimensions.png", "bending_postures.png"):
+    for name in ("bending_dimensions.png", "bending_poses.png"):
         assert mpl.pyplot.imread(folder / name).std() > 0.05
 
 
@@ -293,7 +293,7 @@ def test_example_in_a_notebook_on_the_embedded_data(monkeypatch, capsys, tmp_pat
     out = capsys.readouterr().out
     for words in (
         "9 of bending",
-        "template",
+        "pattern",
         "spread, dense",
         "key-frames missed",
         "time of warping all",

@@ -54,7 +54,7 @@ FUNCTIONS = {
     ),
     "write_report": lambda sync, _, path, **k: report_of(sync, X, path=path, unit="frames", **k),
     "ActionModelDisplay.from_estimator": lambda _, model, path, **k: (
-        display.ActionModelDisplay.from_estimator(model, X, **k).performances
+        display.ActionModelDisplay.from_estimator(model, X, **k).trials
     ),
     "GroupDisplay.from_estimator": lambda sync, _, path, **k: (
         display.GroupDisplay.from_estimator(sync, X, GROUP, **k).offsets

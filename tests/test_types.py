@@ -76,7 +76,7 @@ def test_help_shows_the_names_of_types_and_not_what_they_stand_for():
     assert_for_each(check, CALLABLES)
 
 
-def test_help_speaks_of_performances():
+def test_help_speaks_of_trials():
     def check(name, each):
         for method in dir(each):
             if not method.startswith(("_", "set_", "get_")):
@@ -139,7 +139,7 @@ sync = LinearSynchronizer().fit(X)
 
 # Each of these is right: it runs, and mypy has nothing to say about it.
 RIGHT = """\
-DenseSynchronizer(n_frames=30, cost="posture", metric=None, refine=False, max_offset=0.2)
+DenseSynchronizer(n_frames=30, cost="pose", metric=None, refine=False, max_offset=0.2)
 DenseSynchronizer(pattern=X[0], random_state=np.random.RandomState(0), max_fit=None)
 DenseSynchronizer.paper(n_frames=30).fit(X).pattern_.mean(axis=0)
 LinearSynchronizer(pattern=sync.pattern_index_).fit(X)
@@ -170,7 +170,7 @@ FeatureHoldoutScorer(2)(sync, X) + least_squares(np.stack(X), np.stack(X))
 group_timing_error(sync.match(X).times.tolist(), [[0, 0.5, 1]] * 3)
 make_gait(2, takes=True).data[0].shape
 partial(read_motion, "trial.amc", asf="trial.asf")
-to_sequences(pd.DataFrame({"trial": [1, 1, 2, 2], "x": [0.0, 1, 0, 1]}), by="trial")
+to_trials(pd.DataFrame({"trial": [1, 1, 2, 2], "x": [0.0, 1, 0, 1]}), by="trial")
 """
 
 # Each of these is wrong: it raises an error, and mypy reports it.
@@ -205,8 +205,8 @@ FeatureHoldoutScorer("many")(sync, X)
 make_bending(frame_rate="50 Hz")
 read_motion("trial.c3d", ends="cut")
 synchronization_distances(X, cost="euclidean")
-find_performances(sync, X, threshold="mean")
-to_sequences(tables[0], by=0)
+find_trials(sync, X, threshold="mean")
+to_trials(tables[0], by=0)
 """
 
 

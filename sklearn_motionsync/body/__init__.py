@@ -1,1 +1,1 @@
-"""The body: skeletons, the landmarks of the paper's fifteen joints, postures by Eq. 1."""
+"""The body: skeletons, the landmarks of the paper's fifteen joints, poses by Eq. 1."""

@@ -12,10 +12,10 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
 from ..inputs.numbers import column_names
-from ..inputs.types import NamesLike, PerformancesLike, Transformed
+from ..inputs.types import NamesLike, Transformed, TrialsLike
 from ..inputs.validation import (
-    PerformanceTransformerMixin,
-    check_performances,
+    TrialTransformerMixin,
+    check_trials,
     names_of_input,
     restore,
 )
@@ -95,7 +95,7 @@ class Portion(NamedTuple):
 
 
 class Body:
-    """The body of a performance, checked, of which few frames are computed at a time.
+    """The body of a trial, checked, of which few frames are computed at a time.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Body:
     hides : bool
         Whether NaN are hidden joints.
     called : str
-        The name of the performance, with a capital letter.
+        The name of the trial, with a capital letter.
 
     Attributes
     ----------
@@ -219,9 +219,7 @@ class Body:
             )
 
 
-class PositionsTransformer(
-    DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, BaseEstimator
-):
+class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstimator):
     """Base of the transformers that compute features of joint positions, body by body.
 
     A subclass has a ``skeleton``; ``hidden``, which is "raise" or "nan"; ``_names``, of its
@@ -235,8 +233,8 @@ class PositionsTransformer(
     _facts = "frame_rate", "up"
 
     @validated
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
-        """Check the performances, and learn the limb lengths.
+    def fit(self, X: TrialsLike, y: object = None) -> Self:
+        """Check the trials, and learn the limb lengths.
 
         Parameters
         ----------
@@ -274,7 +272,7 @@ class PositionsTransformer(
         check_input_features(self, input_features)
         return np.asarray(self._names, dtype=object)
 
-    def transform(self, X: PerformancesLike) -> Transformed:
+    def transform(self, X: TrialsLike) -> Transformed:
         """Features of joint positions.
 
         Parameters
@@ -296,10 +294,10 @@ class PositionsTransformer(
             has only one of the two segments, that one decides.
         """
         check_is_fitted(self, "limb_lengths_")
-        performances = self._check(X, reset=False)
-        bodies = (self._body(performances, i) for i in range(len(performances)))
+        trials = self._check(X, reset=False)
+        bodies = (self._body(trials, i) for i in range(len(trials)))
         features = [body.features(self._features) for body in bodies]
-        return restore(self, performances, features)
+        return restore(self, trials, features)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -310,25 +308,25 @@ class PositionsTransformer(
 
     @property
     def _finite(self):
-        """How `check_performances` treats NaN."""
+        """How `check_trials` treats NaN."""
         return "allow-nan" if self.hidden == "nan" else True
 
     def _measure(self, X):
-        """Check performances of a fit, and return the median length of each of their limbs."""
-        performances = self._check(X, reset=True)
+        """Check trials of a fit, and return the median length of each of their limbs."""
+        trials = self._check(X, reset=True)
         limbs = self.skeleton.limbs
         with self._progress(fits=True) as progress:
-            step, lengths = progress.stage("measuring limbs", len(performances)), []
-            for i in range(len(performances)):
-                lengths.append(self._body(performances, i).lengths)
+            step, lengths = progress.stage("measuring limbs", len(trials)), []
+            for i in range(len(trials)):
+                lengths.append(self._body(trials, i).lengths)
                 step()
         lengths = np.concatenate(lengths) if len(lengths) > 1 else lengths[0]
         medians = median_lengths(lengths)[limb_indices(limbs)]
         if np.isnan(medians).any():
             never = [name for name, length in zip(limbs, medians, strict=True) if np.isnan(length)]
             raise ValueError(
-                f"The limbs {never} are hidden in every frame of every performance, so that their "
-                "lengths cannot be learnt. Fit on performances that show them, or leave their "
+                f"The limbs {never} are hidden in every frame of every trial, so that their "
+                "lengths cannot be learnt. Fit on trials that show them, or leave their "
                 "landmarks out of the skeleton: Skeleton(..., landmarks={'left_wrist': None, ...})."
             )
         return medians
@@ -346,25 +344,25 @@ class PositionsTransformer(
 
     def _check(self, X, *, reset):
         finite = self._finite
-        performances = check_performances(self, X, reset=reset, level="posture", finite=finite)
+        trials = check_trials(self, X, reset=reset, level="pose", finite=finite)
         skeleton = self.skeleton
         # Tables have their columns in the order of fit; if it had none, in that of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
         names = names_of_input(self) or column_names(first)
-        check_columns(names or (), skeleton, "Performance 0", performances[0].shape[1])
-        for i, facts in enumerate(performances.facts):
+        check_columns(names or (), skeleton, "Trial 0", trials[0].shape[1])
+        for i, facts in enumerate(trials.facts):
             up = facts.get("up", skeleton.up)
             if up != skeleton.up:
                 warnings.warn(
-                    f"{performances.called(i)} has the vertical axis {up!r} in its attrs, and the "
+                    f"{trials.called(i)} has the vertical axis {up!r} in its attrs, and the "
                     f"skeleton {skeleton.up!r}. Use Skeleton.from_frame(x), or set x.attrs['up'].",
                     UserWarning,
                     stacklevel=2,
                 )
                 break
-        return performances
+        return trials
 
-    def _body(self, performances, i):
-        """The body of a performance, checked."""
+    def _body(self, trials, i):
+        """The body of a trial, checked."""
         hides = self._finite is not True
-        return Body(performances[i], self.skeleton, hides, performances.called(i))
+        return Body(trials[i], self.skeleton, hides, trials.called(i))

@@ -35,7 +35,7 @@ _LEAST_LENGTH = 1e-6
 # A link whose length changes by a smaller share is rigid.
 _SAME_LENGTH = 0.01
 # Hips whose horizontal part is smaller, as a share of their length, show no heading: within 17
-# degrees of the vertical it jumps by half a turn. The smallest of 343 real performances is 0.33.
+# degrees of the vertical it jumps by half a turn. The smallest of 343 real trials is 0.33.
 _LEAST_HORIZONTAL = 0.3
 # The landmark in the middle of a pair.
 _MIDPOINTS = {"hip": "pelvis", "shoulder": "neck"}
@@ -134,9 +134,9 @@ def _blend_path(figures, frames, weights, size):
 
 
 def _hold_feet(points, structure, arrays, figures, angle, frames, weights, size):
-    """Points of a blend whose feet stand where those of the performances do.
+    """Points of a blend whose feet stand where those of the trials do.
 
-    Soles go along the floor as those of the performances with positive weights do, each along the
+    Soles go along the floor as those of the trials with positive weights do, each along the
     heading of its own body. Negative weights do not make feet slip that stand.
     """
     floor = weights[:, 0] @ [x.foot.min() for x in figures]
@@ -178,7 +178,7 @@ def _blend_heights(tracks, figures, frames, weights, size):
 
 
 class Figure(NamedTuple):
-    """A performance as links, a path and a heading, y up.
+    """A trial as links, a path and a heading, y up.
 
     Attributes
     ----------

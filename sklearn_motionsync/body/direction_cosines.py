@@ -1,4 +1,4 @@
-"""DirectionCosines: postures of joint positions (Eq. 1), and joint positions of postures."""
+"""DirectionCosines: poses of joint positions (Eq. 1), and joint positions of poses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.numbers import as_numbers
-from ..inputs.types import PerformancesLike, Transformed, ValuesLike
+from ..inputs.types import Transformed, TrialsLike, ValuesLike
 from ..inputs.validation import check_transformed, restore
 from .axes import convert_to_parent_axes, project_on_axes
 from .base import PositionsTransformer, mask_hidden
@@ -29,15 +29,15 @@ from .skeleton import Skeleton
 __all__ = ["DirectionCosines"]
 
 # Largest shift of the hips from the pelvis, in leg lengths, that puts a body on the floor. Of 144
-# performances of optical motion capture, and of their approximations in an aSpace, none needs more
+# trials of optical motion capture, and of their approximations in an aSpace, none needs more
 # than 0.21.
 _LARGEST_SHIFT = 0.25
 
 
 class DirectionCosines(PositionsTransformer):
-    """Postures of 37 parameters from joint positions (Eq. 1).
+    """Poses of 37 parameters from joint positions (Eq. 1).
 
-    A posture is the height of the pelvis and, for each of twelve limbs, the cosines of the
+    A pose is the height of the pelvis and, for each of twelve limbs, the cosines of the
     angles between the limb and three axes. It is invariant to the place and the size of the body,
     and with the default axes to its heading.
 
@@ -75,17 +75,17 @@ class DirectionCosines(PositionsTransformer):
 
     See Also
     --------
-    ASpace : The reduced space of these postures.
+    ASpace : The reduced space of these poses.
     JointPositions : The positions of the joints relative to the pelvis.
 
     Notes
     -----
     The first parameter is the height of the pelvis above the lowest ankle of the whole
-    performance, divided by the length of the stretched leg (the median over the performance):
+    trial, divided by the length of the stretched leg (the median over the trial):
     1 for standing, less for sitting, more in the air. The floor is a property of a
-    performance; a 2-D input is one performance.
+    trial; a 2-D input is one trial.
 
-    In a picture, hips and shoulders that coincide in a whole performance point at the camera: both
+    In a picture, hips and shoulders that coincide in a whole trial point at the camera: both
     of their cosines are 0. A joint that the program did not find and put at (0, 0) cannot be told
     from others: repair it, leave it out, or make it NaN and use ``hidden="nan"``.
 
@@ -94,7 +94,7 @@ class DirectionCosines(PositionsTransformer):
     before that, by none. Where both are hidden, the last heading stays; before the first heading
     all limbs are NaN. With ``"parent"`` a limb is NaN if one of the limbs above it is. The height
     needs the pelvis in its frame, an ankle in any frame, and the lengths of the legs: of limbs that
-    a performance never shows they are those of ``fit``, scaled to the limbs that it shows.
+    a trial never shows they are those of ``fit``, scaled to the limbs that it shows.
 
     **Live.** No row but the height depends on later frames, so the last row of the frames so far,
     ``transform(frames[: k + 1])[-1]``, is that of the whole take; its floor is the lowest ankle so
@@ -108,8 +108,8 @@ class DirectionCosines(PositionsTransformer):
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(2, random_state=0)
     >>> cosines = DirectionCosines(bunch.skeleton).fit(bunch.data)
-    >>> postures = cosines.transform(bunch.data)
-    >>> postures[0].shape[1], list(cosines.get_feature_names_out()[:4])
+    >>> poses = cosines.transform(bunch.data)
+    >>> poses[0].shape[1], list(cosines.get_feature_names_out()[:4])
     (37, ['pelvis_height', 'hip_x', 'hip_y', 'hip_z'])
 
     Legs seen by a camera:
@@ -142,22 +142,22 @@ class DirectionCosines(PositionsTransformer):
         self.hidden = hidden
 
     def inverse_transform(
-        self, X: PerformancesLike, limb_lengths: ValuesLike | None = None
+        self, X: TrialsLike, limb_lengths: ValuesLike | None = None
     ) -> Transformed:
-        """Joint positions of postures: the paper's fifteen joints.
+        """Joint positions of poses: the paper's fifteen joints.
 
         Of a skeleton that lacks landmarks they are those that its limbs join,
         ``skeleton.body()``.
 
-        The lowest ankle of a performance is on the floor y = 0, its pelvis above the
+        The lowest ankle of a trial is on the floor y = 0, its pelvis above the
         origin; unless ``reference="world"`` it faces along z. The pelvis is the middle of the hips
         and the neck that of the shoulders. A body of these proportions is reconstructed exactly.
 
-        Postures do not contain the height of the hips relative to the pelvis. All hips of a
-        performance are shifted up or down by one distance that puts its lowest ankle on the floor:
+        Poses do not contain the height of the hips relative to the pelvis. All hips of a
+        trial are shifted up or down by one distance that puts its lowest ankle on the floor:
         then ``transform`` gives the same height of the pelvis, and the same cosines. The largest
-        shift is a quarter of a leg. A body farther from the floor, such as a single posture in the
-        air, stays there, and its height is approximated. A posture without a height has its pelvis
+        shift is a quarter of a leg. A body farther from the floor, such as a single pose in the
+        air, stays there, and its height is approximated. A pose without a height has its pelvis
         at height 0; so has the uppermost joint of a part that no limb joins to the pelvis.
 
         With ``hidden="nan"`` a limb of which a cosine is NaN is hidden: joints below it are
@@ -166,7 +166,7 @@ class DirectionCosines(PositionsTransformer):
         Parameters
         ----------
         X : list of arrays (n_frames_i, 37), 3-D array, or 2-D array
-            Postures. Cosines of a limb are scaled to length 1.
+            Poses. Cosines of a limb are scaled to length 1.
         limb_lengths : array-like of shape (n_limbs,), default=None
             Length of each limb, above 0; by default ``limb_lengths_``.
 
@@ -185,18 +185,18 @@ class DirectionCosines(PositionsTransformer):
         check_is_fitted(self, "limb_lengths_")
         lengths = self._as_lengths(limb_lengths)
         names = self.get_feature_names_out()
-        performances = check_transformed(self, X, names, finite=self._finite)
-        arrays = [self._positions(performances, i, lengths) for i in range(len(performances))]
-        return restore(self, performances, arrays, columns=self.skeleton.body().column_names)
+        trials = check_transformed(self, X, names, finite=self._finite)
+        arrays = [self._positions(trials, i, lengths) for i in range(len(trials))]
+        return restore(self, trials, arrays, columns=self.skeleton.body().column_names)
 
     def position_matrix(
         self, limb_lengths: ValuesLike | None = None
     ) -> tuple[np.ndarray, list[str]]:
-        """The matrix of the linear map from postures to joint positions.
+        """The matrix of the linear map from poses to joint positions.
 
         The pelvis is at its height above the origin, and each joint at the end of its limb. That
         equals ``inverse_transform`` of cosines of length 1, except for its last step: there the
-        hips of a performance, and the legs with them, are shifted by one height that puts the
+        hips of a trial, and the legs with them, are shifted by one height that puts the
         lowest ankle on the floor.
 
         The rows of x and y are an orthographic picture from the front. A `MotionTracker` that
@@ -211,7 +211,7 @@ class DirectionCosines(PositionsTransformer):
         Returns
         -------
         matrix : ndarray of float64, shape (n_dims * n_joints, n_features)
-            ``postures @ matrix.T`` are positions of the joints of ``skeleton.body()``, y up, of a
+            ``poses @ matrix.T`` are positions of the joints of ``skeleton.body()``, y up, of a
             body that faces along z; with ``reference="world"`` along the recording's axes.
         names : list of str
             Names of its rows, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ...
@@ -219,7 +219,7 @@ class DirectionCosines(PositionsTransformer):
         Raises
         ------
         ValueError
-            If ``reference="parent"``, whose axes turn with the posture: that is not linear. Or if
+            If ``reference="parent"``, whose axes turn with the pose: that is not linear. Or if
             ``limb_lengths`` are not numbers above 0, one a limb.
 
         Examples
@@ -244,7 +244,7 @@ class DirectionCosines(PositionsTransformer):
         if self.reference == "parent":
             raise ValueError(
                 "Positions are not linear in cosines along parent limbs, which turn with the "
-                "posture. Use reference='heading' or 'world', or inverse_transform."
+                "pose. Use reference='heading' or 'world', or inverse_transform."
             )
         lengths = self._as_lengths(limb_lengths).astype(np.float64)
         matrix = _forward_matrix(self._all_lengths(lengths), self.skeleton)
@@ -293,10 +293,10 @@ class DirectionCosines(PositionsTransformer):
             )
         return lengths
 
-    def _positions(self, performances, i, lengths):
-        postures, limbs = performances[i], self.skeleton.limbs
+    def _positions(self, trials, i, lengths):
+        poses, limbs = trials[i], self.skeleton.limbs
         first, n_dims = int(self.skeleton.has_height), self.skeleton.n_dims
-        by_limb = postures[:, first:].reshape(len(postures), -1, n_dims)
+        by_limb = poses[:, first:].reshape(len(poses), -1, n_dims)
         if not by_limb.all():
             # A picture may show hips and shoulders end-on.
             end_on = np.array([n_dims == 2 and name in LATERAL_LIMBS for name in limbs])
@@ -304,7 +304,7 @@ class DirectionCosines(PositionsTransformer):
             if zero.any():
                 frame, limb = np.argwhere(zero)[0]
                 raise ValueError(
-                    f"{performances.called(i)}, frame {frame}: the limb {limbs[limb]!r} has no "
+                    f"{trials.called(i)}, frame {frame}: the limb {limbs[limb]!r} has no "
                     f"direction, its cosines are 0. Drop the frame, or give it a "
                     "direction."
                 )
@@ -313,8 +313,8 @@ class DirectionCosines(PositionsTransformer):
         cosines[:, limb_indices(limbs)] = unit_vectors(by_limb)
         if self.reference == "parent":
             cosines = convert_to_parent_axes(cosines, limbs, inverse=True)
-        heights = postures[:, 0] if first else None
-        lengths = self._all_lengths(lengths).astype(postures.dtype)
+        heights = poses[:, 0] if first else None
+        lengths = self._all_lengths(lengths).astype(poses.dtype)
         positions = _forward_kinematics(heights, cosines, lengths, self.skeleton)
         if self._finite is not True:
             mask_hidden(positions.reshape(len(positions), -1, n_dims))

@@ -15,7 +15,7 @@ from .limbs import landmark_positions
 
 __all__ = ["JointNoise"]
 
-# Draws of every posture, and their seed.
+# Draws of every pose, and their seed.
 _DRAWS, _SEED = 20, 0
 
 
@@ -33,7 +33,7 @@ class JointNoise:
         Standard deviation of every coordinate of a joint, in the unit of the positions that
         ``cosines`` was fitted on.
     cosines : DirectionCosines
-        The fitted transformer that makes the postures.
+        The fitted transformer that makes the poses.
 
     Raises
     ------
@@ -50,7 +50,7 @@ class JointNoise:
 
     Notes
     -----
-    The covariance is that of 20 draws of each posture, with limbs of the lengths of ``cosines``. A
+    The covariance is that of 20 draws of each pose, with limbs of the lengths of ``cosines``. A
     landmark that is the mean of several markers has the noise of that mean.
 
     Examples
@@ -73,7 +73,7 @@ class JointNoise:
     def __post_init__(self):
         if not isinstance(self.cosines, DirectionCosines):
             raise TypeError(
-                "JointNoise needs the fitted DirectionCosines that make the postures, got "
+                "JointNoise needs the fitted DirectionCosines that make the poses, got "
                 f"{type(self.cosines).__name__}."
             )
         check_is_fitted(self.cosines)
@@ -82,12 +82,12 @@ class JointNoise:
                 f"sd must be a number above 0, in the unit of the joints; got {self.sd!r}."
             )
 
-    def covariance(self, postures: np.ndarray) -> np.ndarray:
-        """Second moments of the errors of postures whose joints are off.
+    def covariance(self, poses: np.ndarray) -> np.ndarray:
+        """Second moments of the errors of poses whose joints are off.
 
         Parameters
         ----------
-        postures : ndarray, shape (n_frames, n_features)
+        poses : ndarray, shape (n_frames, n_features)
             Direction cosines, over which it is averaged.
 
         Returns
@@ -98,16 +98,16 @@ class JointNoise:
         Raises
         ------
         ValueError
-            If the postures have another width than ``cosines`` make.
+            If the poses have another width than ``cosines`` make.
         """
         width = len(self.cosines.get_feature_names_out())
-        if postures.ndim != 2 or postures.shape[1] != width:
+        if poses.ndim != 2 or poses.shape[1] != width:
             raise ValueError(
                 f"The DirectionCosines of this JointNoise make {counted(width, 'feature')} a "
-                f"frame, and the performances have the shape {postures.shape}. Give those that "
-                "made the performances."
+                f"frame, and the trials have the shape {poses.shape}. Give those that "
+                "made the trials."
             )
-        skeleton, (positions,) = self.cosines.skeleton, self.cosines.inverse_transform([postures])
+        skeleton, (positions,) = self.cosines.skeleton, self.cosines.inverse_transform([poses])
         body, rng = skeleton.body(), np.random.default_rng(_SEED)
         order = [LANDMARKS.index(name) for name in body.joints]
         again = DirectionCosines(body, self.cosines.reference).fit([positions])

@@ -52,24 +52,24 @@ class JointPositions(PositionsTransformer):
 
     See Also
     --------
-    DirectionCosines : Postures of the directions of limbs, with an inverse.
+    DirectionCosines : Poses of the directions of limbs, with an inverse.
 
     Notes
     -----
     The unit is that of the pelvis' height in `DirectionCosines`: the length of the stretched leg,
-    the median over the performance; of a body without a complete leg, the sum of its limbs.
+    the median over the trial; of a body without a complete leg, the sum of its limbs.
     Without a pelvis, positions are relative to the first of these that is there: the middle of the
-    hips, the neck, the middle of the shoulders, the first landmark. A 2-D input is one performance.
+    hips, the neck, the middle of the shoulders, the first landmark. A 2-D input is one trial.
 
-    Hidden hips, and lengths of limbs that a performance never shows, are treated as in
+    Hidden hips, and lengths of limbs that a trial never shows, are treated as in
     `DirectionCosines`.
 
     `DirectionCosines` weighs all limbs alike; positions weigh long limbs more.
     scikit-learn's ``make_union`` joins the features of both, frame by frame. It needs pandas output
     for that, as in the example: without it a union takes the list or 3-D array of each
     transformer for one matrix, and refuses it with a message about shapes. Where all widths and
-    all lengths are equal (``"heading"`` beside ``"world"``, performances of the same number of
-    frames) it may join a list along time. A 2-D input, one performance, needs no pandas. Keep the
+    all lengths are equal (``"heading"`` beside ``"world"``, trials of the same number of
+    frames) it may join a list along time. A 2-D input, one trial, needs no pandas. Keep the
     prefixes that the union puts before names: "neck" is both a limb and a joint.
 
     Examples
@@ -89,7 +89,7 @@ class JointPositions(PositionsTransformer):
     >>> views = views.set_output(transform="pandas")
     >>> table = views.fit_transform(bunch.data)
     >>> table.shape[1], table.index.names
-    (79, FrozenList(['performance', 'frame']))
+    (79, FrozenList(['trial', 'frame']))
     >>> make_pipeline(views, DenseSynchronizer(50)).fit_transform(bunch.data).shape
     (4, 50, 79)
     """

@@ -25,7 +25,7 @@ __all__ = [
     "nearest_ancestor",
     "part_of_limb",
     "parts_of_names",
-    "parts_of_postures",
+    "parts_of_poses",
     "scale_missing_lengths",
     "unit_vectors",
 ]
@@ -208,16 +208,16 @@ def parts_of_names(names):
     return {} if [*parts] == ["trunk"] else parts
 
 
-def parts_of_postures(performances):
-    """Indices of the features of each part, of postures without names; empty if they are others.
+def parts_of_poses(trials):
+    """Indices of the features of each part, of poses without names; empty if they are others.
 
-    Postures of the whole body are recognised by their 37 features: a height, and twelve times
+    Poses of the whole body are recognised by their 37 features: a height, and twelve times
     three cosines of length 1.
     """
     n_limbs, n_dims = len(LIMB_NAMES), 3
-    if performances[0].shape[1] != 1 + n_limbs * n_dims:
+    if trials[0].shape[1] != 1 + n_limbs * n_dims:
         return {}
-    cosines = np.concatenate([x[:, 1:] for x in performances]).astype(np.float64)
+    cosines = np.concatenate([x[:, 1:] for x in trials]).astype(np.float64)
     if not np.abs(cosines).max() < 1 + _UNIT_TOLERANCE:
         return {}
     squares = np.square(cosines.reshape(-1, n_limbs, n_dims)).sum(axis=2)
@@ -225,26 +225,26 @@ def parts_of_postures(performances):
     return features_of_parts(LIMB_NAMES, n_dims, 1) if are_directions.all() else {}
 
 
-def names_of_cosines(performances, names):
+def names_of_cosines(trials, names):
     """Names of features that are direction cosines, whether or not they came with names.
 
     Parameters
     ----------
-    performances : sequence of ndarray (n_frames_i, n_features)
+    trials : sequence of ndarray (n_frames_i, n_features)
     names : list of str
 
     Returns
     -------
     list of str, or None
         ``names`` if some are those of limbs whose cosines have length 1; the names of
-        `DirectionCosines` for postures that `parts_of_postures` recognises; otherwise None.
+        `DirectionCosines` for poses that `parts_of_poses` recognises; otherwise None.
     """
     parts = parts_of_names(names)
     if not parts:
         known = ["pelvis_height", *(f"{limb}_{axis}" for limb in LIMB_NAMES for axis in AXES[3])]
-        return known if parts_of_postures(performances) else None
+        return known if parts_of_poses(trials) else None
     cosines = [k for features in parts.values() for k in features]
-    squares = np.concatenate([np.square(x[:, cosines]).sum(axis=1) for x in performances])
+    squares = np.concatenate([np.square(x[:, cosines]).sum(axis=1) for x in trials])
     n_limbs = len({names[k].rpartition("_")[0] for k in cosines})
     return names if abs(np.nanmean(squares) / n_limbs - 1) < _UNIT_TOLERANCE else None
 

@@ -11,7 +11,7 @@ import pandas as pd
 from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, column_names
 from ..inputs.tables import as_pandas
-from ..inputs.types import PerformancesLike, Transformed
+from ..inputs.types import Transformed, TrialsLike
 from .axes import UP_AXES, heading_axes, to_y_up
 from .formats import AXES, LANDMARKS
 from .landmarks import as_tuple, other_side
@@ -25,16 +25,16 @@ __all__ = ["exchange_of_sides", "mirror"]
 _OFF_CENTRE = 0.25
 
 
-def mirror(X: PerformancesLike, skeleton: Skeleton) -> Transformed:
-    """Exchange left and right: the mirror images of performances.
+def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
+    """Exchange left and right: the mirror images of trials.
 
-    It joins performances with the left and with the right hand to one set, or shows how
+    It joins trials with the left and with the right hand to one set, or shows how
     symmetrically a person moves.
 
     Parameters
     ----------
     X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, 2-D array or DataFrame
-        Joint positions, one or several performances; gaps may be NaN.
+        Joint positions, one or several trials; gaps may be NaN.
     skeleton : Skeleton
         The joints. Left and right joints are exchanged: those at a left and a right landmark, then
         those whose names differ by "left" and "right", or "L" and "R". All others are in the
@@ -74,13 +74,13 @@ def mirror(X: PerformancesLike, skeleton: Skeleton) -> Transformed:
             f"{type(skeleton).__name__}."
         )
     counterparts, alone = _counterparts(skeleton)
-    # One array of several performances is mirrored as a whole.
+    # One array of several trials is mirrored as a whole.
     whole = isinstance(X, pd.DataFrame) or getattr(X, "ndim", 1) == 3
     one = whole or as_collection(X) is None
     sequences: Any = [X] if one else X
     parts = list(sequences)
     if not parts:
-        raise ValueError("Found 0 performances (n_samples=0); there is nothing to mirror.")
+        raise ValueError("Found 0 trials (n_samples=0); there is nothing to mirror.")
     arrays = [_as_positions(x, skeleton, i) for i, x in enumerate(parts)]
     _check_middle(arrays, skeleton, alone)
     mirrored = [
@@ -91,8 +91,8 @@ def mirror(X: PerformancesLike, skeleton: Skeleton) -> Transformed:
 
 
 def _as_positions(x, skeleton, i):
-    """Positions (..., n_joints, n_dims) of one performance, or of several in one array."""
-    what = f"Performance {i}"
+    """Positions (..., n_joints, n_dims) of one trial, or of several in one array."""
+    what = f"Trial {i}"
     x = as_pandas(x)
     check_columns(column_names(x) or (), skeleton, what)
     array = as_numbers(x, what)
@@ -226,7 +226,7 @@ def _check_middle(arrays, skeleton, alone):
 
 
 def exchange_of_sides(names, limbs=None):
-    """The columns and signs that make the mirror image of postures from direction cosines.
+    """The columns and signs that make the mirror image of poses from direction cosines.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def exchange_of_sides(names, limbs=None):
     Returns
     -------
     columns : ndarray of int, signs : ndarray
-        The image is ``signs * postures[..., columns]``. None if a limb lacks its counterpart, or
+        The image is ``signs * poses[..., columns]``. None if a limb lacks its counterpart, or
         there is no left and right.
     """
     names = [str(name) for name in names]

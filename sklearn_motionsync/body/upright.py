@@ -9,17 +9,17 @@ from .limbs import LIMB_NAMES, body_size, landmark_positions, median_lengths, un
 __all__ = ["check_upright", "estimate_up"]
 
 # A body is upside down if it is so in this share of its frames, by this share of its leg length. Of
-# 363 real performances that bend, hop, crouch and sit down, the closest one has its pelvis
+# 363 real trials that bend, hop, crouch and sit down, the closest one has its pelvis
 # 0.26 legs above the ankles and its head, on average, 0.15 above the pelvis.
 _MOST_FRAMES, _MARGIN = 0.9, 0.1
 # Points whose left and right limbs differ by a larger factor are not taken for a body; in those
-# performances the largest factor is 1.38.
+# trials the largest factor is 1.38.
 _LARGEST_ASYMMETRY = 1.5
 # The mean direction from the feet to the head, of length 1 at most, must have this component along
 # the vertical axis ...
 _LEAST_COMPONENT = 0.5
 # ... which exceeds the others by this factor if two segments give it. Bent bodies are recognised by
-# the legs, or by the hanging arms: none of 343 real performances is mistaken. A trunk alone is
+# the legs, or by the hanging arms: none of 343 real trials is mistaken. A trunk alone is
 # mistaken in half of the deep bends.
 _LEAST_RATIO = 1.5
 

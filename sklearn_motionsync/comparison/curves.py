@@ -25,7 +25,7 @@ _MOST_PARTS = 8
 
 
 class AlignedCurves(NamedTuple):
-    """Signals of trials on the clock of the template, and the timing that this took away.
+    """Signals of trials on the clock of the pattern, and the timing that this took away.
 
     Attributes
     ----------
@@ -38,12 +38,12 @@ class AlignedCurves(NamedTuple):
     offsets : ndarray, shape (n_sequences, P)
         In the unit of time.
     clock : ndarray, shape (P,)
-        The times of the frames of the template, in the unit of time.
+        The times of the frames of the pattern, in the unit of time.
     unit : str
         Of time.
     match : Match
     reached : Routed
-        The synchronizer, and the performances that reach it.
+        The synchronizer, and the trials that reach it.
     """
 
     names: list
@@ -58,19 +58,19 @@ class AlignedCurves(NamedTuple):
 
     @classmethod
     def of(cls, estimator, X, params, caller, *, signals, features, unit, frame_rate):
-        """Match performances, and warp their signals.
+        """Match trials, and warp their signals.
 
         Parameters
         ----------
         estimator : synchronizer, or Pipeline with one
             Fitted.
-        X : performances, as the estimator takes them
+        X : trials, as the estimator takes them
         params : dict
             Other arguments of ``match``.
         caller : str
             The function that the user called, for messages.
-        signals : performances, or None
-            One sequence of any length a performance. None: X itself, if what reaches the
+        signals : trials, or None
+            One sequence of any length a trial. None: X itself, if what reaches the
             synchronizer has the same features, such as after scaling; otherwise that.
         features : int, str or list of them, or None
             Those of the signals; None for all.
@@ -83,7 +83,7 @@ class AlignedCurves(NamedTuple):
         params = with_frame_rate(params, frame_rate)
         reached = route_to_synchronizer(estimator, X, params, caller)
         # As recorded: steps before the synchronizer may resample.
-        lengths = [len(x) for x in as_collection(X) or reached.performances]
+        lengths = [len(x) for x in as_collection(X) or reached.trials]
         rates = rates_of(X, frame_rate, unit)
         names, units, sequences = _signals(X, reached, signals, features)
         match, n = reached.match(), len(lengths)
@@ -107,14 +107,14 @@ class AlignedCurves(NamedTuple):
             `DenseSynchronizer`, or where the features that are left support no warps.
         """
         reached = self.reached
-        sync, performances = reached.synchronizer, reached.performances
-        n = performances[0].shape[1]
+        sync, trials = reached.synchronizer, reached.trials
+        n = trials[0].shape[1]
         if not isinstance(sync, DenseSynchronizer) or n < 2:
             return
         # Confidences belong to all features.
         params = {k: v for k, v in reached.params.items() if k in ("keyframes", "frame_rate")}
         for out in np.array_split(np.arange(n), min(n, _MOST_PARTS)):
-            reduced = [np.delete(x, out, axis=1) for x in performances]
+            reduced = [np.delete(x, out, axis=1) for x in trials]
             one = clone(sync).set_params(pattern=np.delete(sync.pattern_, out, axis=1), verbose=0)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -125,7 +125,7 @@ class AlignedCurves(NamedTuple):
 
 def _signals(X, reached, signals, features):
     """Names and units of the chosen signals, and their arrays (n_frames_i, n_chosen)."""
-    sequences = reached.performances
+    sequences = reached.trials
     n, width = len(sequences), sequences[0].shape[1]
     names = names_of_features(reached.before, reached.synchronizer, width)
     units = [""] * width
@@ -137,7 +137,7 @@ def _signals(X, reached, signals, features):
         sequences, columns = read_collection(signals)
         if len(sequences) != n:
             raise ValueError(
-                f"signals must have one sequence for each of {counted(n, 'performance')}, got "
+                f"signals must have one sequence for each of {counted(n, 'trial')}, got "
                 f"{len(sequences)}."
             )
         names = columns or [f"x{i}" for i in range(sequences[0].shape[1])]
@@ -147,5 +147,5 @@ def _signals(X, reached, signals, features):
     names, units = [names[i] for i in chosen], [units[i] for i in chosen]
     sequences = [x[:, chosen] for x in sequences]
     for i, x in enumerate(sequences):
-        check_finite(x, f"Performance {i}, frame", names)
+        check_finite(x, f"Trial {i}, frame", names)
     return names, units, sequences

@@ -12,13 +12,13 @@ from ..inputs.resampling import as_frame_rates
 from ..inputs.types import (
     Labels,
     NumbersLike,
-    PerformancesLike,
     RandomState,
     Table,
+    TrialsLike,
     Unit,
     ValuesLike,
 )
-from ..inputs.validation import SequenceLevelMixin, check_performances
+from ..inputs.validation import SequenceLevelMixin, check_trials
 from ..io.events import is_table_of_events, keyframes_from_events
 from ..synchronizers.match import check_unit, rates_of
 from ..utils.parallel import Progress
@@ -28,7 +28,7 @@ __all__ = ["compare_events"]
 
 
 def compare_events(
-    X: PerformancesLike,
+    X: TrialsLike,
     events: Table | NumbersLike | None = None,
     groups: Labels | None = None,
     *,
@@ -48,18 +48,18 @@ def compare_events(
 
     Parameters
     ----------
-    X : performances
+    X : trials
         The trials: their labels, lengths, and frame rates count.
     events : DataFrame or array-like, default=None
         One row an event, with the trial, the event, and the time in seconds or frames, as in
         `io.keyframes_from_events`; or what that returns: frames, one row a trial and one column an
         event, NaN where one is not known. By default the events in ``attrs`` of the trials.
     groups : sequence of length n_sequences, default=None
-        The group of each performance. Without groups and covariate there is no test.
+        The group of each trial. Without groups and covariate there is no test.
     covariate : array-like of numbers, shape (n_sequences,), default=None
         Such as speed or age, instead of groups: a regression.
     people : sequence of length n_sequences, default=None
-        The subject of each performance. By default every performance is of another person.
+        The subject of each trial. By default every trial is of another person.
     paired : bool, default=False
         Whether every person has trials in both of two groups.
     unit : {"percent", "frames", "seconds"}, default="percent"
@@ -112,9 +112,9 @@ def compare_events(
     A table of events in seconds, without groups:
 
     >>> import pandas as pd
-    >>> from sklearn_motionsync import to_frame, to_sequences
+    >>> from sklearn_motionsync import to_frame, to_trials
     >>> names = pd.Index([*"abcd"], name="trial")
-    >>> trials = to_sequences(to_frame(gait.data[:4], performances=names))
+    >>> trials = to_trials(to_frame(gait.data[:4], trials=names))
     >>> events = pd.DataFrame({"trial": names, "event": "toe-off", "seconds": [0.6, 0.6, 0.7, 0.6]})
     >>> compare_events(trials, events, frame_rate=100).round(1)
              mean   sd  n
@@ -146,7 +146,7 @@ def _times_of_events(X, events, unit, frame_rate):
     if events is None or is_table_of_events(events):
         events = keyframes_from_events(X, events, frame_rate=frame_rate)
     reader = type("compare_events", (SequenceLevelMixin, BaseEstimator), {})()
-    trials = check_performances(reader, X, reset=True, level="sequence", finite="allow-nan")
+    trials = check_trials(reader, X, reset=True, level="sequence", finite="allow-nan")
     n, last = len(trials), np.array([[len(x) - 1] for x in trials])
     frames = Keyframes(events, n, name="events").known(trials) * last
     scale = np.ones((n, 1))
@@ -155,9 +155,7 @@ def _times_of_events(X, events, unit, frame_rate):
         scale = 100 / last
     elif unit == "seconds":
         if rates is None:
-            raise ValueError(
-                "unit='seconds' needs frame_rate, frames a second of the performances."
-            )
+            raise ValueError("unit='seconds' needs frame_rate, frames a second of the trials.")
         scale = 1 / np.broadcast_to(as_frame_rates(rates, n), (n, 1))
     names = events.columns if isinstance(events, pd.DataFrame) else range(frames.shape[1])
     return frames * scale, names

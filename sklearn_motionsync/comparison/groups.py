@@ -10,7 +10,7 @@ import pandas as pd
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
-from ..inputs.types import Features, Labels, PerformancesLike, RandomState, Unit, ValuesLike
+from ..inputs.types import Features, Labels, RandomState, TrialsLike, Unit, ValuesLike
 from ..matching.counting import first_largest, runs_of
 from ..synchronizers.match import UNITS
 from ..utils.parallel import Progress
@@ -125,13 +125,13 @@ class GroupComparison:
 
 def compare_groups(
     estimator: BaseEstimator,
-    X: PerformancesLike,
+    X: TrialsLike,
     groups: Labels | None = None,
     *,
     covariate: ValuesLike | None = None,
     people: Labels | None = None,
     paired: bool = False,
-    signals: PerformancesLike | None = None,
+    signals: TrialsLike | None = None,
     features: Features | None = None,
     level: float = 0.05,
     n_permutations: int = 1999,
@@ -144,26 +144,26 @@ def compare_groups(
 ) -> GroupComparison:
     """Test whether groups differ in the shape of their curves, in their timing, and where.
 
-    All trials are on the clock of one template. The aligned curves hold the shape, the offsets the
+    All trials are on the clock of one pattern. The aligned curves hold the shape, the offsets the
     timing. Both are tested together and apart, by permutations of people.
 
     Parameters
     ----------
     estimator : synchronizer, or Pipeline with one
-        Fitted on the trials of all groups together, so that no group has a template of its own.
-    X : performances
+        Fitted on the trials of all groups together, so that no group has a pattern of its own.
+    X : trials
         As the estimator takes them.
     groups : sequence of length n_sequences, default=None
-        The group of each performance: two or more.
+        The group of each trial: two or more.
     covariate : array-like of numbers, shape (n_sequences,), default=None
         Such as speed or age, instead of groups: a regression.
     people : sequence of length n_sequences, default=None
-        The subject of each performance. The mean of the trials of a person, in a group, is one
-        unit. By default every performance is of another person.
+        The subject of each trial. The mean of the trials of a person, in a group, is one
+        unit. By default every trial is of another person.
     paired : bool, default=False
         Whether every person has trials in both of two groups, such as before and after.
-    signals : performances, default=None
-        What is compared, such as joint angles in degrees: one sequence a performance, at any frame
+    signals : trials, default=None
+        What is compared, such as joint angles in degrees: one sequence a trial, at any frame
         rate. By default X in its own units, if the same features reach the synchronizer, scaled or
         not; otherwise what reaches it, such as the dimensions of an `ASpace`.
     features : int, str or list of them, default=None
@@ -173,7 +173,7 @@ def compare_groups(
     n_permutations : int, default=1999
         Number of random permutations, or of flips of signs if paired.
     unit : {"percent", "frames", "seconds"}, default="percent"
-        Of places and offsets. In seconds the template lasts as long as the median performance.
+        Of places and offsets. In seconds the pattern lasts as long as the median trial.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second of X, for seconds; by default what tables tell, as in `Match.offsets_in`.
         Key-frames are then in seconds, as for ``match``.
@@ -248,7 +248,7 @@ def compare_groups(
 def compare_aligned(
     aligned, study, level=0.05, n_permutations=1999, random_state=0, n_jobs=None, verbose=0
 ):
-    """The comparison of performances that are matched already: `AlignedCurves`."""
+    """The comparison of trials that are matched already: `AlignedCurves`."""
     values = aligned.curves, aligned.offsets[:, :, np.newaxis], aligned.even
     curves, offsets, even = map(study.units, values)
     shape, timing, linear = families(

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 
-from ..inputs.types import Features, Labels, PerformancesLike, Unit, ValuesLike
+from ..inputs.types import Features, Labels, TrialsLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..matching.counting import first_largest, runs_of
 from ..model.acceptance import LogMoments
@@ -62,7 +62,7 @@ class NormComparison:
     unit : {"frames", "percent", "seconds"}
         Of time.
     clock : ndarray, shape (P,)
-        Times of the frames of the template.
+        Times of the frames of the pattern.
     features, units : list of str
         Names and units of the signals, and of the offset at last.
     mean, std : ndarray, shape (P, n_signals + 1)
@@ -134,12 +134,12 @@ class NormComparison:
 
 def compare_to_norm(
     estimator: BaseEstimator,
-    X: PerformancesLike,
+    X: TrialsLike,
     groups: Labels,
     *,
     norm: Hashable,
     people: Labels | None = None,
-    signals: PerformancesLike | None = None,
+    signals: TrialsLike | None = None,
     features: Features | None = None,
     level: float = 0.05,
     unit: Unit = "percent",
@@ -148,22 +148,22 @@ def compare_to_norm(
 ) -> NormComparison:
     """Tell of single subjects whether they differ from a norm, in shape or in timing, and where.
 
-    All trials are on the clock of one template. A subject is compared by the mean of the trials,
+    All trials are on the clock of one pattern. A subject is compared by the mean of the trials,
     in the aligned curves and in the offsets.
 
     Parameters
     ----------
     estimator : synchronizer, or Pipeline with one
         Fitted on the norm, or on all trials.
-    X : performances
+    X : trials
         Those of the norm and of the subjects, as the estimator takes them.
     groups : sequence of length n_sequences
-        The group of each performance.
+        The group of each trial.
     norm : label
         The group that is the norm. The people of all others are compared with it.
     people : sequence of length n_sequences, default=None
-        The subject of each performance. By default every performance is of another person.
-    signals : performances, default=None
+        The subject of each trial. By default every trial is of another person.
+    signals : trials, default=None
         What is compared, as in `compare_groups`: by default X in its own units, or what reaches the
         synchronizer.
     features : int, str or list of them, default=None
@@ -192,7 +192,7 @@ def compare_to_norm(
     See Also
     --------
     compare_groups : Tests whether groups differ.
-    find_departures : Departures of performances from an `ActionModel`.
+    find_departures : Departures of trials from an `ActionModel`.
     sklearn_motionsync.display.NormDisplay : Draws a subject before the norm.
 
     Notes
@@ -235,7 +235,7 @@ def compare_to_norm(
 
 
 def _compare(aligned, study, level):
-    """The comparison of performances that are matched already: `AlignedCurves`."""
+    """The comparison of trials that are matched already: `AlignedCurves`."""
     timing = aligned.offsets[:, :, np.newaxis]
     values = np.concatenate([aligned.curves, timing], axis=2).astype(np.float64, copy=False)
     of_norm = [values[trials] for trials in study.of_norm]
@@ -328,7 +328,7 @@ class _Subjects(NamedTuple):
     Attributes
     ----------
     of_norm, of_subjects : list of ndarray of int
-        The performances of each person of the norm, and of each subject.
+        The trials of each person of the norm, and of each subject.
     labels, groups : list
         Of the subjects.
     """

@@ -50,13 +50,13 @@ _BATCH = 250
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What differs between units, how they are made of performances, and what a size is.
+    """What differs between units, how they are made of trials, and what a size is.
 
     Attributes
     ----------
     design : Design
     maker : ndarray, shape (n_units, n_sequences)
-        The values of a unit are this matrix times those of the performances: a mean, a difference
+        The values of a unit are this matrix times those of the trials: a mean, a difference
         of means, or a slope.
     groups : ndarray of int, shape (n_units,), or None
         Of each unit, if units are of several groups.
@@ -75,7 +75,7 @@ class Study:
     words: str
 
     def units(self, values):
-        """Values (n_units, ...) of those of the performances; NaN where one of these is."""
+        """Values (n_units, ...) of those of the trials; NaN where one of these is."""
         missing = np.isnan(values)
         of_units = np.tensordot(self.maker, np.where(missing, 0.0, values), 1)
         if missing.any():
@@ -224,7 +224,7 @@ class GroupsOfPeople:
     people : list of ndarray of int
         For each group, the codes of its people.
     counts : list of int
-        Performances of each group.
+        Trials of each group.
     """
 
     labels: list
@@ -234,7 +234,7 @@ class GroupsOfPeople:
 
     @classmethod
     def of(cls, groups, people, n):
-        """Those of n performances; without people, every performance is of another person."""
+        """Those of n trials; without people, every trial is of another person."""
         codes, labels = encode_groups(groups, n)
         if groups is None:
             codes, labels = np.zeros(n, dtype=int), [""]
@@ -266,7 +266,7 @@ class GroupsOfPeople:
         return entries
 
     def means(self, values):
-        """Means (n_people_k, ...) of people in each group, of the known values of performances."""
+        """Means (n_people_k, ...) of people in each group, of the known values of trials."""
         is_known = ~np.isnan(values)
         means = []
         for maker in self.makers:
@@ -276,7 +276,7 @@ class GroupsOfPeople:
         return means
 
     def fill(self, values):
-        """Values of performances, those that are not known by the mean of the same person."""
+        """Values of trials, those that are not known by the mean of the same person."""
         filled = np.array(values, dtype=float)
         for maker, means in zip(self.makers, self.means(values), strict=True):
             for row, mean in zip(maker > 0, means, strict=True):
@@ -314,7 +314,7 @@ def _means(persons, in_group=None):
 
 
 def _firsts(persons):
-    """The index of the first performance of each person."""
+    """The index of the first trial of each person."""
     return np.unique(persons, return_index=True)[1]
 
 
@@ -327,11 +327,11 @@ def _check_covariate(covariate, n):
     values = as_numbers(covariate, "covariate", dtype=np.float64)
     if values.shape != (n,):
         raise ValueError(
-            f"covariate must have one number for each of {counted(n, 'performance')}, got shape "
+            f"covariate must have one number for each of {counted(n, 'trial')}, got shape "
             f"{values.shape}."
         )
     if not np.isfinite(values).all() or np.ptp(values) == 0:
-        raise ValueError("covariate must be finite, and must differ between performances.")
+        raise ValueError("covariate must be finite, and must differ between trials.")
     return values
 
 

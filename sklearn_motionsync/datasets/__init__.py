@@ -1,8 +1,8 @@
-"""Performances to begin with: synthetic ones with known truth, and archives of real ones."""
+"""Trials to begin with: synthetic ones with known truth, and archives of real ones."""
 
-from .archive import load_performances
+from .archive import load_trials
 from .bending import make_bending
 from .gait import make_gait
 from .walk import make_walk
 
-__all__ = ["load_performances", "make_bending", "make_gait", "make_walk"]
+__all__ = ["load_trials", "make_bending", "make_gait", "make_walk"]

@@ -1,4 +1,4 @@
-"""Performances from archives of joint positions (``*_positions.npz``)."""
+"""Trials from archives of joint positions (``*_positions.npz``)."""
 
 import sys
 import zipfile
@@ -16,16 +16,16 @@ _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "p
 _TEXTS = ("label", "actor", "take", "joints")
 
 
-def load_performances(path: Path) -> Bunch:
-    """Read an archive of performances.
+def load_trials(path: Path) -> Bunch:
+    """Read an archive of trials.
 
     Parameters
     ----------
     path : str or path-like
         A NumPy archive (``.npz``) with ``positions`` (sum of frames, joints, 3);
-        ``offsets`` (N + 1,), performance i being ``positions[offsets[i]:offsets[i + 1]]``;
+        ``offsets`` (N + 1,), trial i being ``positions[offsets[i]:offsets[i + 1]]``;
         ``label``, ``actor``, ``take`` and ``fps`` (N,); ``joints`` and ``parents`` (joints,).
-        Every performance has at least two frames, and every position is finite. Parents are
+        Every trial has at least two frames, and every position is finite. Parents are
         indices of joints, -1 for a root. Labels, actors and takes are text or whole numbers.
 
     Returns
@@ -34,7 +34,7 @@ def load_performances(path: Path) -> Bunch:
         data : list of ndarray (n_frames_i, 3 * n_joints)
             Joint positions, joint by joint x, y, z, in the unit and dtype of the archive.
         target, actor, take : ndarray of str (N,)
-            The action, the actor, and the number of the performance.
+            The action, the actor, and the number of the trial.
         joints : list of str
             Names of the joints.
         skeleton : Skeleton or None
@@ -54,14 +54,14 @@ def load_performances(path: Path) -> Bunch:
     --------
     >>> import numpy as np
     >>> from sklearn_motionsync import Skeleton
-    >>> from sklearn_motionsync.datasets import load_performances
+    >>> from sklearn_motionsync.datasets import load_trials
     >>> folder = getfixture("tmp_path")
     >>> kinect = Skeleton.kinect()
     >>> np.savez(
     ...     folder / "one.npz", positions=np.zeros((7, 20, 3)), offsets=[0, 7], label=["bow"],
     ...     actor=["A"], take=["1"], fps=[30.0], joints=kinect.joints, parents=kinect.parents,
     ... )
-    >>> bunch = load_performances(folder / "one.npz")
+    >>> bunch = load_trials(folder / "one.npz")
     >>> bunch.data[0].shape, bunch.target[0]
     ((7, 60), np.str_('bow'))
     """
@@ -81,7 +81,7 @@ def load_performances(path: Path) -> Bunch:
     data = np.split(positions.reshape(len(positions), -1), offsets[1:-1])
     columns = [f"{joint}_{axis}" for joint in joints for axis in "xyz"]
     for i, x in enumerate(data):
-        check_finite(x, f"{path}: performance {i}, frame", columns)
+        check_finite(x, f"{path}: trial {i}, frame", columns)
     return Bunch(
         data=data,
         target=texts["label"],
@@ -96,7 +96,7 @@ def load_performances(path: Path) -> Bunch:
 def _check_positions(path, fields):
     """Positions and offsets; all other fields have the shapes that go with them."""
     if missing := [name for name in _NEEDED if name not in fields]:
-        raise ValueError(f"{path} lacks {missing}; an archive of performances holds {_NEEDED}.")
+        raise ValueError(f"{path} lacks {missing}; an archive of trials holds {_NEEDED}.")
     positions, offsets = fields["positions"], fields["offsets"]
     if positions.dtype.kind != "f" or positions.shape[2:] != (3,) or not positions.shape[1]:
         raise ValueError(
@@ -114,7 +114,7 @@ def _check_positions(path, fields):
     if offsets[0] != 0 or offsets[-1] != n_frames or bad.any():
         raise ValueError(
             f"{path}: offsets must increase from 0 to the {n_frames} frames of positions, by at "
-            f"least 2 for each performance, got {_quote(offsets)}."
+            f"least 2 for each trial, got {_quote(offsets)}."
         )
     sizes = dict.fromkeys(("label", "actor", "take", "fps"), len(lengths))
     sizes |= dict.fromkeys(("joints", "parents"), positions.shape[1])

@@ -1,4 +1,4 @@
-"""Synthetic performances of a skeleton that bends down and rises again."""
+"""Synthetic trials of a skeleton that bends down and rises again."""
 
 from __future__ import annotations
 
@@ -58,14 +58,14 @@ _ANGLES = {
 
 @validated_function(
     {
-        "n_performances": [Interval(Integral, 1, 10**6, closed="both")],
+        "n_trials": [Interval(Integral, 1, 10**6, closed="both")],
         "n_frames": [Interval(Integral, 10, 10**6, closed="both")],
         "n_actors": [Interval(Integral, 1, 10**6, closed="both")],
         **LIMITS,
     }
 )
 def make_bending(
-    n_performances: int = 40,
+    n_trials: int = 40,
     *,
     n_frames: int = 100,
     n_actors: int = 4,
@@ -75,32 +75,32 @@ def make_bending(
     frame_rate: float = 50.0,
     random_state: RandomState = None,
 ) -> Bunch:
-    """Performances of a bending action, with the true warps and key-frames.
+    """Trials of a bending action, with the true warps and key-frames.
 
     A skeleton of fifteen joints stands, bends down until its right hand is near the
-    floor, and rises again. Every actor has a body and a style; every performance has a pace (a
+    floor, and rises again. Every actor has a body and a style; every trial has a pace (a
     smooth random warp), a duration, a place and a heading, and the noise of a motion capture
     system.
 
     Parameters
     ----------
-    n_performances : int, default=40
-        Number of performances, up to a million.
+    n_trials : int, default=40
+        Number of trials, up to a million.
     n_frames : int, default=100
-        Mean number of frames, from 10 to a million; performances have 0.75 to 1.25 times as many.
+        Mean number of frames, from 10 to a million; trials have 0.75 to 1.25 times as many.
     n_actors : int, default=4
-        Number of actors, up to a million; the performances are theirs in turn.
+        Number of actors, up to a million; the trials are theirs in turn.
     style : float, default=1.0
-        Size of the differences in movement between actors and between performances, from 0 to 100.
+        Size of the differences in movement between actors and between trials, from 0 to 100.
     warp : float, default=1.0
-        Size of the variation of pace within a performance, from 0 (an even pace) to 10. At 1 the
-        rates of two performances differ at most by a factor of 2, at 10 by one of 1024.
+        Size of the variation of pace within a trial, from 0 (an even pace) to 10. At 1 the
+        rates of two trials differ at most by a factor of 2, at 10 by one of 1024.
     noise : float, default=0.002
         Standard deviation of the noise of each coordinate, in metres, up to 1000.
     frame_rate : float, default=50.0
         Frames per second, from 0.001; only returned.
     random_state : int, RandomState instance or None, default=None
-        Seed of the generator; by default every call makes other performances.
+        Seed of the generator; by default every call makes other trials.
 
     Returns
     -------
@@ -109,9 +109,9 @@ def make_bending(
             Joint positions in metres, y up.
         times : list of ndarray (n_frames_i,)
             The moment of the action that each frame shows, from 0 to 1: frames of two
-            performances with equal times show the same moment.
-        keyframes : ndarray (n_performances, 5)
-            Frame (with fraction) of five moments in each performance.
+            trials with equal times show the same moment.
+        keyframes : ndarray (n_trials, 5)
+            Frame (with fraction) of five moments in each trial.
         keyframe_names : list of str
             Names of these moments.
         keyframe_times : ndarray (5,)
@@ -120,8 +120,8 @@ def make_bending(
             The paper's skeleton of fifteen joints.
         joints : list of str
             Names of the joints.
-        target, actor, take : ndarray of str (n_performances,)
-            The action, the actor, and the number of the performance.
+        target, actor, take : ndarray of str (n_trials,)
+            The action, the actor, and the number of the trial.
         frame_rate : float
             Frames per second, as given.
 
@@ -145,7 +145,7 @@ def make_bending(
     actors = [_draw_actor(rng, style) for _ in range(n_actors)]
     moments = np.array(list(_KEYFRAMES.values()))
     data, times, keyframes = [], [], []
-    for i in range(n_performances):
+    for i in range(n_trials):
         length = whole(n_frames * rng.uniform(0.75, 1.25))
         phase = _draw_warp(rng, length, warp)
         lengths, angles = actors[i % n_actors]
@@ -155,7 +155,7 @@ def make_bending(
         data.append(positions.reshape(length, -1))
         times.append(phase)
         keyframes.append(np.interp(moments, phase, np.arange(length)))
-    numbers = np.arange(n_performances)
+    numbers = np.arange(n_trials)
     return Bunch(
         data=data,
         times=times,
@@ -164,7 +164,7 @@ def make_bending(
         keyframe_times=moments,
         skeleton=Skeleton.paper(),
         joints=list(Skeleton.paper().joints),
-        target=np.full(n_performances, "bending"),
+        target=np.full(n_trials, "bending"),
         actor=np.array([f"actor{k}" for k in numbers % n_actors]),
         take=np.array([f"{k:03d}" for k in numbers // n_actors + 1]),
         frame_rate=float(frame_rate),

@@ -129,16 +129,16 @@ def make_gait(
         times : list of ndarray (n_frames_i,)
             The moment that each frame shows, the same in both groups, from 0 to 1; in takes from
             heel strike to heel strike, up to ``n_cycles``.
-        keyframes : ndarray (n_performances, 5)
+        keyframes : ndarray (n_trials, 5)
             Frame (with fraction) of five moments within each cycle; in takes those of all cycles,
             and the heel strikes: ``(n_people, 6 * n_cycles + 1)``.
         keyframe_names : list of str
             Names of these moments; in takes with the number of the cycle.
         keyframe_times : ndarray (n_keyframes,)
             These moments on the scale of ``times``.
-        person, group : ndarray of str (n_performances,)
+        person, group : ndarray of str (n_trials,)
             The person, and the group, "A" or "B".
-        cycle : ndarray of int (n_performances,)
+        cycle : ndarray of int (n_trials,)
             The number of the cycle of the person, from 1; not with takes.
         events : list of list of dict
             With takes only: the foot strikes and foot-offs of each, as of ``read_motion``.
@@ -189,7 +189,7 @@ def make_gait(
 
 
 def _describe_groups(people, amplitude, timing):
-    """The person and group of each performance, and the typical movement of each group."""
+    """The person and group of each trial, and the typical movement of each group."""
     moments = np.linspace(0, 1, _N_MOMENTS)
     return {
         "person": np.array([f"person{i}" for i in people]),

@@ -35,7 +35,7 @@ class MovingDisplay(Display):
         fps: int = 15,
         azimuth: float = -60,
     ) -> Animation:
-        """Animate the performances.
+        """Animate the trials.
 
         Parameters
         ----------
@@ -43,7 +43,7 @@ class MovingDisplay(Display):
             As for `plot`; by default the axes of the last plot. Then the figure is closed after the
             notebook has shown the animation.
         seconds : float, default=5.0
-            The time until the longest performance ends.
+            The time until the longest trial ends.
         fps : int, default=15
             Pictures a second; each takes 10 to 50 kB of a notebook.
         azimuth : float, default=-60

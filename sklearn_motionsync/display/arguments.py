@@ -1,4 +1,4 @@
-"""Arguments that several displays take: names, units, indices, frames, and performances."""
+"""Arguments that several displays take: names, units, indices, frames, and trials."""
 
 from collections.abc import Iterable, Mapping, Set
 from itertools import takewhile
@@ -20,7 +20,7 @@ __all__ = [
     "as_index",
     "as_indices",
     "as_names",
-    "as_performances",
+    "as_trials",
     "labels_as_text",
     "labels_of_signals",
     "times_from_zero",
@@ -91,17 +91,17 @@ def as_frames(frames, n_frames):
     return np.linspace(0, n_frames - 1, int(frames)).round().astype(int).tolist()
 
 
-def as_performances(X) -> list:
-    """The performances of a collection, or a single one as a list."""
+def as_trials(X) -> list:
+    """The trials of a collection, or a single one as a list."""
     collection = as_collection(X)
     if collection is not None and len(collection) == 0:
-        raise ValueError("Found 0 performances (n_samples=0); there is nothing to draw.")
+        raise ValueError("Found 0 trials (n_samples=0); there is nothing to draw.")
     return [X] if collection is None else collection
 
 
-def labels_as_text(performances):
-    """Labels of performances, the levels of a label joined by commas."""
-    return list(map(text_of_label, labels_of(performances)[0]))
+def labels_as_text(trials):
+    """Labels of trials, the levels of a label joined by commas."""
+    return list(map(text_of_label, labels_of(trials)[0]))
 
 
 def labels_of_signals(names, known_units, ylabel=None, units=None):
@@ -151,7 +151,7 @@ def undo_scaling(before, X, width):
     ----------
     before : Pipeline or None
         The steps before an estimator. Synchronizers among them change no features.
-    X : performances, as the pipeline takes them, or None
+    X : trials, as the pipeline takes them, or None
     width : int
         The number of features that reach the estimator.
 

@@ -49,7 +49,7 @@ __all__ = [
 # Okabe and Ito's colours and a violet, which colour-blind people can distinguish. Each has one
 # meaning in all figures.
 COLORS = {
-    "performance": "#0072B2",
+    "trial": "#0072B2",
     "pattern": "#000000",
     "mean": "#D55E00",
     "envelope": "#999999",
@@ -77,8 +77,8 @@ _TRIAL_LABELS = {
     "seconds": "time of the trial (s)",
 }
 _CLOCK_LABELS = {
-    "frames": "frame of the template",
-    "percent": "% of the template",
+    "frames": "frame of the pattern",
+    "percent": "% of the pattern",
     "seconds": "time of the median trial (s)",
 }
 # The height of ticks, as a share of the panel.
@@ -376,7 +376,7 @@ class TimeAxis:
     n_frames : int
         The length of the clock.
     lengths : sequence of int, default=None
-        The number of frames of each performance. None if unknown; ``frame_rate`` is then that of
+        The number of frames of each trial. None if unknown; ``frame_rate`` is then that of
         the clock.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second, for seconds only.
@@ -385,16 +385,16 @@ class TimeAxis:
     keyframes : Series, default=None
         Key-frames on the clock, in frames, by name.
     trial_keyframes : ndarray, shape (n_sequences, n_keyframes), default=None
-        Those of the performances in their frames, NaN where one is not known.
+        Those of the trials in their frames, NaN where one is not known.
 
     Attributes
     ----------
     unit : str
     clock : ndarray, shape (P,)
         The times of the frames of the clock. In seconds the clock lasts as long as the median
-        performance.
+        trial.
     label, trial_label : str
-        Axis labels of the clock and of the performances.
+        Axis labels of the clock and of the trials.
     """
 
     def __init__(
@@ -427,11 +427,11 @@ class TimeAxis:
         return cls(unit, len(clock), None, clock_rate(clock), label)
 
     def trials(self):
-        """The times of the frames of each performance: list of ndarray (n_frames_i,)."""
+        """The times of the frames of each trial: list of ndarray (n_frames_i,)."""
         return self.of_trials([np.arange(n) for n in self.lengths])
 
     def of_trials(self, frames):
-        """Frames of each performance, whole or not, in the unit: list of ndarray."""
+        """Frames of each trial, whole or not, in the unit: list of ndarray."""
         if self.unit == "percent":
             return [100 * f / (n - 1) for f, n in zip(frames, self.lengths, strict=True)]
         if self.unit == "seconds":
@@ -456,7 +456,7 @@ class TimeAxis:
         return [draw_keyframes(axis, times, names if axis is named else ()) for axis in axes]
 
     def draw_trial_keyframes(self, axes, colors):
-        """Draw those of the performances as ticks along the lower edges, in one colour or many."""
+        """Draw those of the trials as ticks along the lower edges, in one colour or many."""
         from matplotlib.collections import LineCollection
 
         if self.trial_keyframes is None:
@@ -488,14 +488,14 @@ def offset_label(unit):
 
 
 def _frame_rates(frame_rate, lengths):
-    """A frame rate for each performance; one for the clock without performances."""
+    """A frame rate for each trial; one for the clock without trials."""
     count = 1 if lengths is None else len(lengths)
     if frame_rate is None:
-        raise ValueError("unit='seconds' needs frame_rate, frames a second of the performances.")
+        raise ValueError("unit='seconds' needs frame_rate, frames a second of the trials.")
     return np.broadcast_to(as_frame_rates(frame_rate, count), (count, 1))[:, 0]
 
 
-# -- key-frames: lines on the clock, and ticks of each performance ---------------------------
+# -- key-frames: lines on the clock, and ticks of each trial ---------------------------
 
 
 def named_keyframes(synchronizer, keyframes):
@@ -518,14 +518,14 @@ def named_keyframes(synchronizer, keyframes):
     return pd.Series(frames, index=keyframes.columns if named else None)
 
 
-def keyframes_of_trials(synchronizer, performances, params):
-    """Key-frames (n_sequences, n_keyframes) of performances, in their frames, None if not given."""
+def keyframes_of_trials(synchronizer, trials, params):
+    """Key-frames (n_sequences, n_keyframes) of trials, in their frames, None if not given."""
     keyframes, on_clock = params.get("keyframes"), getattr(synchronizer, "keyframes_", None)
     if keyframes is None or on_clock is None:
         return None
-    rows = Keyframes(keyframes, len(performances), params.get("frame_rate"))
-    last = np.array([[len(x) - 1] for x in performances])
-    return rows.shares(performances, len(on_clock)) * last
+    rows = Keyframes(keyframes, len(trials), params.get("frame_rate"))
+    last = np.array([[len(x) - 1] for x in trials])
+    return rows.shares(trials, len(on_clock)) * last
 
 
 def text_of_label(label):

@@ -16,7 +16,7 @@ __all__ = [
     "BodyPanel",
     "bones_by_side",
     "bounds",
-    "invert_postures",
+    "invert_poses",
     "landmark_track",
     "place_on_floor",
     "project",
@@ -31,7 +31,7 @@ _FLAT = 0.05
 
 
 def read_positions(x, skeleton, i):
-    """Positions (n_frames, n_joints, n_dims) of one performance, the second axis vertical.
+    """Positions (n_frames, n_joints, n_dims) of one trial, the second axis vertical.
 
     Parameters
     ----------
@@ -41,14 +41,14 @@ def read_positions(x, skeleton, i):
         Without a skeleton the second axis is vertical. There are three axes, or two if the names of
         the columns or their number imply it.
     i : int
-        The index of the performance, for messages.
+        The index of the trial, for messages.
     """
     if skeleton is not None and not isinstance(skeleton, Skeleton):
         raise ValueError(
             "skeleton must be a Skeleton, such as Skeleton.paper() or bunch.skeleton, or None for "
             f"points without bones; got {type(skeleton).__name__}."
         )
-    what = f"Performance {i}"
+    what = f"Trial {i}"
     if skeleton is not None:
         wanted = skeleton.column_names
         if set(column_names(x) or ()) == set(wanted) and len(x.columns) == len(wanted):
@@ -196,8 +196,8 @@ def _side_of(joint, skeleton, side_of):
     return None
 
 
-def invert_postures(x, inverse, skeleton):
-    """Positions (n_frames, n_joints, n_dims) of postures; NaN where they are unknown.
+def invert_poses(x, inverse, skeleton):
+    """Positions (n_frames, n_joints, n_dims) of poses; NaN where they are unknown.
 
     Parameters
     ----------

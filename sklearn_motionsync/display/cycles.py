@@ -12,7 +12,7 @@ from sklearn.base import BaseEstimator
 from ..body.formats import SIDES
 from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features
-from ..inputs.types import PerformancesLike, Unit
+from ..inputs.types import TrialsLike, Unit
 from ..inputs.wording import counted
 from ..segmentation.cycles import (
     CycleSegmenter,
@@ -96,7 +96,7 @@ class CycleDisplay(Display):
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: TrialsLike,
         *,
         take: int = 0,
         feature: int | str | None = None,
@@ -144,7 +144,7 @@ class CycleDisplay(Display):
         """
         if not isinstance(estimator, CycleSegmenter):
             raise ValueError(f"Give a CycleSegmenter, got {type(estimator).__name__}.")
-        fitted = hasattr(estimator, "template_")
+        fitted = hasattr(estimator, "pattern_")
         segmenter = CycleSegmenter(**estimator.get_params()).set_params(not_cyclic="skip")
         recordings, takes = check_takes(segmenter, X, reset=True)
         i = as_index(take, len(takes), "take")
@@ -181,7 +181,7 @@ class CycleDisplay(Display):
     def _draw(self):
         upper, lower = self.axes_
         (times,) = self.axis.trials()
-        blue, black, orange = (COLORS[k] for k in ("performance", "pattern", "mean"))
+        blue, black, orange = (COLORS[k] for k in ("trial", "pattern", "mean"))
         correlation, peaks = self.repeats.correlation, self.repeats.peaks
         lags = times[: len(correlation)]
         (self.correlation_,) = upper.plot(lags, correlation, color=blue)

@@ -13,7 +13,7 @@ from ..body.formats import SIDES
 from ..body.skeleton import Skeleton
 from ..gait.events import events_of, tabulate_events
 from ..gait.recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
-from ..inputs.types import PerformancesLike, Table, ValuesLike
+from ..inputs.types import Table, TrialsLike, ValuesLike
 from ..inputs.wording import counted
 from .arguments import as_index
 from .base import WIDTH, AxesLike, Display, legend_above
@@ -75,7 +75,7 @@ class GaitDisplay(Display):
     @classmethod
     def from_positions(
         cls,
-        X: PerformancesLike,
+        X: TrialsLike,
         skeleton: Skeleton | None = None,
         *,
         events: Table | None = None,

@@ -16,7 +16,7 @@ from ..comparison.norm import NormComparison
 from ..comparison.study import GroupsOfPeople, band_of_mean
 from ..inputs.features import choose_features
 from ..inputs.keyframes import Keyframes
-from ..inputs.types import Features, Labels, NumbersLike, PerformancesLike, Unit, ValuesLike
+from ..inputs.types import Features, Labels, NumbersLike, TrialsLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..matching.counting import first_largest
 from ..synchronizers.match import check_coverage
@@ -55,13 +55,13 @@ _BAR, _BESIDE = 0.015, 0.014
 
 
 class GroupCurves(NamedTuple):
-    """The mean, the band and the performances of a group in each panel.
+    """The mean, the band and the trials of a group in each panel.
 
     Attributes
     ----------
     mean, lower, upper : ndarray, shape (P, n_panels)
         The bounds are NaN without a band.
-    performances : ndarray (n, P, n_panels), or None
+    trials : ndarray (n, P, n_panels), or None
     label : str
         The entry of the legend.
     color, line : str
@@ -71,14 +71,14 @@ class GroupCurves(NamedTuple):
     mean: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-    performances: np.ndarray | None
+    trials: np.ndarray | None
     label: str
     color: str
     line: str
 
-    def draw_performances(self, axis, clock, i):
-        """Draw the performances in panel i."""
-        behind = self.performances[:, :, i]
+    def draw_trials(self, axis, clock, i):
+        """Draw the trials in panel i."""
+        behind = self.trials[:, :, i]
         return curves(
             axis, [clock] * len(behind), behind, colors=self.color, linewidths=0.7, alpha=0.5
         )
@@ -113,7 +113,7 @@ class GroupDisplay(Display):
     offsets : list of ndarray, shape (n_people_k, P)
         For each group the offsets of its people from the mean of all trials, in the unit of time.
     axis : TimeAxis
-        The clock of the template.
+        The clock of the pattern.
     ylabels : list of str
         Labels of the signals.
     feature_names : list of str
@@ -177,11 +177,11 @@ class GroupDisplay(Display):
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: TrialsLike,
         groups: Labels | None = None,
         *,
         people: Labels | None = None,
-        signals: PerformancesLike | None = None,
+        signals: TrialsLike | None = None,
         features: Features | None = None,
         statistic: Literal["sd", "se", "interval"] = "sd",
         coverage: float = 0.95,
@@ -196,20 +196,20 @@ class GroupDisplay(Display):
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
-        """Draw groups of performances on the clock of one template.
+        """Draw groups of trials on the clock of one pattern.
 
         Parameters
         ----------
         estimator : synchronizer, or Pipeline with one
-            Fitted on the performances of all groups together.
-        X : performances
+            Fitted on the trials of all groups together.
+        X : trials
             As the estimator takes them.
         groups : sequence of length n_sequences, default=None
-            The group of each performance. None draws all as one group.
+            The group of each trial. None draws all as one group.
         people : sequence of length n_sequences, default=None
-            The subject of each performance. Means and bands are of the means of people. By default
-            every performance counts as a person.
-        signals : performances, default=None
+            The subject of each trial. Means and bands are of the means of people. By default
+            every trial counts as a person.
+        signals : trials, default=None
             What is drawn, as in `compare_groups`. By default X in its own units, if the same
             features reach the synchronizer, scaled or not.
         features : int, str or list of them, default=None
@@ -222,11 +222,11 @@ class GroupDisplay(Display):
         coverage : float, default=0.95
             Probability of ``"interval"``.
         trials : bool, default=False
-            Whether to draw all performances, thin.
+            Whether to draw all trials, thin.
         comparison : GroupComparison, default=None
             From `compare_groups` of the same groups: its clusters are bars at the lower edges.
         events : array-like, shape (n_sequences, n_events), default=None
-            Events in frames of each performance, NaN where one is not known, such as of
+            Events in frames of each trial, NaN where one is not known, such as of
             `keyframes_from_events`: lines at their mean place, in a band of one standard deviation
             of people. The columns of a table are their names. By default ``keyframes``. The panel
             of offsets has its dots there; without events, where timing differs most: at the peak of
@@ -303,9 +303,9 @@ class GroupDisplay(Display):
         *above, timing = self.axes_
         clock = self.axis.clock
         self.trials_ = []
-        if self.groups[0].performances is not None:
+        if self.groups[0].trials is not None:
             self.trials_ = [
-                [group.draw_performances(axis, clock, i) for group in self.groups]
+                [group.draw_trials(axis, clock, i) for group in self.groups]
                 for i, axis in enumerate(above)
             ]
         self.bands_, self.means_ = [], []
@@ -415,7 +415,7 @@ def display_of_groups(
     units=None,
     xlabel=None,
 ):
-    """The display of performances that are matched already: `AlignedCurves` of ``features``.
+    """The display of trials that are matched already: `AlignedCurves` of ``features``.
 
     The others are those of `GroupDisplay.from_estimator`.
     """
@@ -473,8 +473,8 @@ def _events_on_clock(events, aligned, of_people):
         events, rate, name = params.get("keyframes"), params.get("frame_rate"), "keyframes"
     if events is None:
         return None
-    performances = aligned.reached.performances
-    shares = Keyframes(events, len(performances), rate, name=name).known(performances)
+    trials = aligned.reached.trials
+    shares = Keyframes(events, len(trials), rate, name=name).known(trials)
     last = len(aligned.clock) - 1
     frames = np.arange(last + 1.0)
     places = np.array(
@@ -625,7 +625,7 @@ class NormDisplay(Display):
                     )
                 )
             self.mean_.extend(axis.plot(clock, mean, color="0.3", linewidth=1, linestyle="--"))
-            line = front_line(axis, clock, curve, color=COLORS["performance"], linewidth=2.4)
+            line = front_line(axis, clock, curve, color=COLORS["trial"], linewidth=2.4)
             self.subject_.append(line)
             xs, ys = parts_outside(curve[np.newaxis], mean - reach, mean + reach)
             xs = axis_of_time.convert(xs)

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from sklearn.base import BaseEstimator
 
-from ..inputs.types import Labels, PerformancesLike, Unit, ValuesLike
+from ..inputs.types import Labels, TrialsLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..synchronizers.match import rates_of
 from ..synchronizers.parts import Lags, PartSynchronizer
@@ -28,7 +28,7 @@ class LagDisplay(Display):
 
     The map shows the mean lag. It is hatched where the 95 % confidence interval of the mean
     contains 0. The curves show the mean and the interval; broken lines are one standard deviation
-    of performances from the mean. Use `from_estimator`.
+    of trials from the mean. Use `from_estimator`.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class LagDisplay(Display):
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: TrialsLike,
         *,
         groups: Labels | None = None,
         unit: Unit = "percent",
@@ -85,20 +85,20 @@ class LagDisplay(Display):
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
-        """Draw the lags of performances.
+        """Draw the lags of trials.
 
         Parameters
         ----------
         estimator : PartSynchronizer, or Pipeline with one
             Fitted.
-        X : performances
+        X : trials
             As the estimator takes them.
         groups : array-like, shape (n_sequences,), default=None
-            The subject of each performance.
+            The subject of each trial.
         unit : {"frames", "percent", "seconds"}, default="percent"
             Unit of the lags.
         frame_rate : float or array-like (n_sequences,), default=None
-            Frames a second of the performances, for seconds; by default what tables tell, as in
+            Frames a second of the trials, for seconds; by default what tables tell, as in
             `Match.to_frame`.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
@@ -118,7 +118,7 @@ class LagDisplay(Display):
             estimator, X, params, caller, kind=PartSynchronizer, uses=()
         )
         lags = reached.synchronizer.lags(
-            reached.performances,
+            reached.trials,
             groups,
             unit=unit,
             frame_rate=rates_of(X, frame_rate, unit),
@@ -194,7 +194,7 @@ class LagDisplay(Display):
             shading="nearest",
             rasterized=True,
         )
-        # NaN bounds, of a single performance, are unsure as well.
+        # NaN bounds, of a single trial, are unsure as well.
         unsure = ~((columns["low"] > 0) | (columns["high"] < 0))
         self.unsure_ = [
             top.fill_between(

@@ -9,7 +9,7 @@ import numpy as np
 from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import LIMBS
-from ..inputs.tables import name_performance
+from ..inputs.tables import name_trial
 from ..model.departures import judge
 from ..model.views import models_of_classes
 from ..utils.pipelines import find_step, find_synchronizer, flat_steps, union_transformers
@@ -36,7 +36,7 @@ def limb_departures(rows, n_frames, frames, skeleton):
     Parameters
     ----------
     rows : list of Departure
-        Of one performance, the most important first.
+        Of one trial, the most important first.
     n_frames : int
         Of the clock.
     frames : int or list of int
@@ -121,15 +121,15 @@ def _bones_of_limb(limb, skeleton):
     return [ends] if ends in skeleton.bones else [b for b in skeleton.bones if b[1] in ends]
 
 
-def draw_departures(estimator, X, params, caller, *, performance, frames, limit, reference):
-    """What `SkeletonDisplay` draws of the departures of a performance: values of its parameters.
+def draw_departures(estimator, X, params, caller, *, trial, frames, limit, reference):
+    """What `SkeletonDisplay` draws of the departures of a trial: values of its parameters.
 
     Parameters
     ----------
     estimator : Pipeline
     X, params, caller
         As for `view_of`.
-    performance, frames, limit, reference
+    trial, frames, limit, reference
         As for `SkeletonDisplay.from_departures`.
 
     Returns
@@ -137,12 +137,12 @@ def draw_departures(estimator, X, params, caller, *, performance, frames, limit,
     scenes, skeleton, titles, marked, behind, heading
     """
     if X is None:
-        raise ValueError(f"{caller} needs performances X, whose departures are drawn; got None.")
-    index = partial(as_index, performance, what="performance")
+        raise ValueError(f"{caller} needs trials X, whose departures are drawn; got None.")
+    index = partial(as_index, trial, what="trial")
     models = models_of_classes(estimator, X, params, caller, index)
     if models is not None:
         (model,) = models
-        estimator, X, params = model.estimator, model.performances, {}
+        estimator, X, params = model.estimator, model.trials, {}
     before, _ = split_at_synchronizer(estimator)
     if limit is not None and not limit > 0:
         raise ValueError(
@@ -160,15 +160,15 @@ def draw_departures(estimator, X, params, caller, *, performance, frames, limit,
         )
     if models is None:
         i, note = index(len(view.labels)), ""
-        name = name_performance(i, view.labels[i])
+        name = name_trial(i, view.labels[i])
     else:
         i, note = 0, " by the model of that class"
-        name = name_performance(int(model.indices[0]), model.labels[0])
+        name = name_trial(int(model.indices[0]), model.labels[0])
         name = f"{name}, most like {str(model.label)!r},"
     rows, skeleton = judged.rows(i, limit), limbs.cosines.skeleton.body()
     is_accepted = view.model_of_points.predict(view.curves.points.take([i]))[0] == 1
     if limit is None:
-        # Hints would hide what is rare, and most right performances have some.
+        # Hints would hide what is rare, and most right trials have some.
         rows = [row for row in rows if row.rare] or ([] if is_accepted else rows)
     shown, titles, marked = limb_departures(rows, len(judged.mean), frames, skeleton)
     bodies, shadows = (
@@ -188,7 +188,7 @@ def draw_departures(estimator, X, params, caller, *, performance, frames, limit,
     whose = "a new person" if reference is None else "this person"
     rare = [describe_departure(row) for row in rows if row.rare and row.limb is not None]
     heading = (
-        f"{name.replace('Performance', 'Trial', 1)} is {verdict}{note}.\n"
+        f"{name.replace('Trial', 'Trial', 1)} is {verdict}{note}.\n"
         f"Rare: {', '.join(rare) if rare else 'nothing'}. Violet: limbs that depart at or around "
         f"that frame. Pale: what is expected of {whose}."
     )
@@ -202,7 +202,7 @@ def split_at_synchronizer(estimator):
     if before is None:
         raise ValueError(
             "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
-            "by itself use from_performances with the joint positions."
+            "by itself use from_trials with the joint positions."
         )
     transformers = [each for step in flat_steps(before) for each in union_transformers(step)]
     views = [each for each in transformers if isinstance(each, PositionsTransformer)]

@@ -1,4 +1,4 @@
-"""PhaseDisplay: the phase of running performances, and the predicted rest of them."""
+"""PhaseDisplay: the phase of running trials, and the predicted rest of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection
 from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.types import Features, Indexed, PerformancesLike, ValuesLike
+from ..inputs.types import Features, Indexed, TrialsLike, ValuesLike
 from ..inputs.wording import counted
 from ..matching.counting import first_largest
 from ..online.stream import Course, LivePhase, each_value
@@ -26,18 +26,18 @@ from .arguments import (
     TIME_LABELS,
     as_index,
     as_names,
-    as_performances,
+    as_trials,
     labels_as_text,
     labels_of_signals,
     times_from_zero,
 )
 from .base import COLORS, WIDTH, AxesLike, front_line, legend_above
-from .bodies import BodyPanel, bounds, invert_postures, project, stage
+from .bodies import BodyPanel, bounds, invert_poses, project, stage
 
 __all__ = ["PhaseDisplay"]
 
-# The number of performances by default.
-_N_PERFORMANCES = 4
+# The number of trials by default.
+_N_TRIALS = 4
 # The height of a row of panels in inches.
 _ROW = 2.2
 # Characters a line of a title or an axis label.
@@ -60,9 +60,9 @@ _MIN_OPACITY = 0.12
 
 @dataclass(eq=False, repr=False)
 class PhaseDisplay(MovingDisplay):
-    """Running performances: their phase, its confidence, and a prediction.
+    """Running trials: their phase, its confidence, and a prediction.
 
-    Panels for each performance: a dial of its phase, with an arc that ends at the phase after a
+    Panels for each trial: a dial of its phase, with an arc that ends at the phase after a
     tenth of the mean duration at the present rate; the phase over time with its interval and its
     confidence; and features, as far as they were observed, with the predicted rest: the mean from
     the phase on, for as long as `OnlineSynchronizer.time_left` estimates. With ``body`` also a
@@ -73,8 +73,8 @@ class PhaseDisplay(MovingDisplay):
     ----------
     action : LearntAction
         The learnt action, with its clock.
-    performances : list of RunningPerformance
-        The performances with their phases.
+    trials : list of RunningTrial
+        The trials with their phases.
     features : list of str, default=()
         The labels of the features.
     skeleton : Skeleton, default=None
@@ -89,7 +89,7 @@ class PhaseDisplay(MovingDisplay):
     axes_ : list of Axes
         Row by row: a body if there are bodies, the dial, the phase, and one a feature.
     rows_ : list
-        The artists of each performance: ``row.dial.passed``, ``row.phase``, ``row.interval``,
+        The artists of each trial: ``row.dial.passed``, ``row.phase``, ``row.interval``,
         ``row.confidence``, ``row.afterwards``, ``row.rest``, ``row.curves[k].seen``,
         ``row.curves[k].expected``.
 
@@ -105,28 +105,28 @@ class PhaseDisplay(MovingDisplay):
     >>> live = OnlineSynchronizer().fit(X[:6])
     >>> display = PhaseDisplay.from_estimator(live, X[6:], frame=40)
     >>> display, len(display.axes_)
-    (PhaseDisplay(2 performances), 6)
+    (PhaseDisplay(2 trials), 6)
     """
 
     action: LearntAction
-    performances: Sequence[RunningPerformance]
+    trials: Sequence[RunningTrial]
     features: Sequence[str] = ()
     skeleton: Skeleton | None = None
     unit: Literal["frames", "seconds"] = "frames"
     xlabel: str | None = None
 
     def __repr__(self):
-        return f"PhaseDisplay({counted(len(self.performances), 'performance')})"
+        return f"PhaseDisplay({counted(len(self.trials), 'trial')})"
 
     @classmethod
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: TrialsLike,
         *,
         times: Indexed[ValuesLike] | ValuesLike | None = None,
         features: Features | None = None,
-        training: PerformancesLike | None = None,
+        training: TrialsLike | None = None,
         body: BaseEstimator | None = None,
         names: Sequence[str] | None = None,
         ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
@@ -136,25 +136,25 @@ class PhaseDisplay(MovingDisplay):
         ax: AxesLike | None = None,
         azimuth: float = -60,
     ) -> Self:
-        """Follow performances, and draw their phases.
+        """Follow trials, and draw their phases.
 
         Parameters
         ----------
         estimator : OnlineSynchronizer
-            Fitted. The performances that it follows live are not affected.
+            Fitted. The trials that it follows live are not affected.
         X : list of arrays (n_frames_i, n_features), or one of them
-            Performances; of more than four the first four are drawn.
+            Trials; of more than four the first four are drawn.
         times : list of array-like (n_frames_i,), default=None
-            As ``estimator.track`` takes them; of one performance an array.
+            As ``estimator.track`` takes them; of one trial an array.
         features : int, str or list of them, default=None
-            By index or name; by default the one that varies most in the mean performance.
-        training : performances, default=None
+            By index or name; by default the one that varies most in the mean trial.
+        training : trials, default=None
             Those of ``fit``. Their standard deviation from the mean is drawn as a band.
         body : DirectionCosines or Pipeline, default=None
             The fitted transformer of the features, with ``inverse_transform``. The body is then
             drawn, without the limbs that have a NaN cosine. In a pipeline one NaN hides the body.
         names : list of str, default=None
-            The names of the performances that are drawn; by default their labels in X, or numbers.
+            The names of the trials that are drawn; by default their labels in X, or numbers.
         ylabel, units : str, list of str or dict, default=None
             Labels of the features and their units: of all, one each, or by name. By default their
             names, and what tables tell in ``attrs["units"]``.
@@ -182,16 +182,16 @@ class PhaseDisplay(MovingDisplay):
                 f"estimator must be an OnlineSynchronizer, got {type(estimator).__name__}."
             )
         live = estimator
-        is_single, performances = as_collection(X) is None, list(as_performances(X))
-        performances = performances[:_N_PERFORMANCES]
-        names = labels_as_text(performances) if names is None else names
-        names = as_names(names, len(performances), "names", "performances")
+        is_single, trials = as_collection(X) is None, list(as_trials(X))
+        trials = trials[:_N_TRIALS]
+        names = labels_as_text(trials) if names is None else names
+        names = as_names(names, len(trials), "names", "trials")
         stamps = None
         if times is not None:
             listed: Any = [times] if is_single else times
-            stamps = listed[:_N_PERFORMANCES]
-        phases = live.track(performances, stamps)
-        seen = [np.asarray(x, dtype=np.float64) for x in performances]
+            stamps = listed[:_N_TRIALS]
+        phases = live.track(trials, stamps)
+        seen = [np.asarray(x, dtype=np.float64) for x in trials]
         feature_names = names_of_features(body, live, live.mean_.shape[1])
         if features is None:
             features = [first_largest(live.mean_.var(axis=0))]
@@ -200,7 +200,7 @@ class PhaseDisplay(MovingDisplay):
         bodies, mean_body, skeleton = [None] * len(seen), None, None
         if body is not None:
             skeleton = find_step(body, DirectionCosines)[1].skeleton.body()
-            *bodies, mean_body = (invert_postures(x, body, skeleton) for x in (*seen, live.mean_))
+            *bodies, mean_body = (invert_poses(x, body, skeleton) for x in (*seen, live.mean_))
         action = LearntAction(
             live.n_frames_,
             live.cyclic,
@@ -210,7 +210,7 @@ class PhaseDisplay(MovingDisplay):
             mean_body,
         )
         running = [
-            RunningPerformance.of(
+            RunningTrial.of(
                 action,
                 phase,
                 np.arange(len(x)) / rate if stamps is None else times_from_zero(stamps[k], len(x)),
@@ -218,12 +218,12 @@ class PhaseDisplay(MovingDisplay):
                 seen=x[:, shown],
                 afterwards=None
                 if live.cyclic or np.isnan(x).any()
-                else _final_phases(live, performances[k]),
+                else _final_phases(live, trials[k]),
                 body=bodies[k],
             )
             for k, (x, phase) in enumerate(zip(seen, phases, strict=True))
         ]
-        known_units = units_of_columns(performances[0])
+        known_units = units_of_columns(trials[0])
         labels = [feature_names[k] for k in shown]
         display = cls(
             action,
@@ -252,7 +252,7 @@ class PhaseDisplay(MovingDisplay):
         Parameters
         ----------
         phases : LivePhase, or list of LivePhase
-            The phases of one performance or several, of arrays (n_frames_i,); or of arrays
+            The phases of one trial or several, of arrays (n_frames_i,); or of arrays
             (n_frames, n_streams).
         n_frames : int
             The length of the clock, ``live.n_frames_``.
@@ -279,7 +279,7 @@ class PhaseDisplay(MovingDisplay):
         """
         action = LearntAction(n_frames, cyclic, duration)
         running = [
-            RunningPerformance.of(action, phase, np.arange(float(len(phase.phase))), name=str(k))
+            RunningTrial.of(action, phase, np.arange(float(len(phase.phase))), name=str(k))
             for k, phase in enumerate(_as_list_of_phases(phases))
         ]
         return cls(action, running, xlabel=xlabel).plot(ax, frame=frame)
@@ -295,7 +295,7 @@ class PhaseDisplay(MovingDisplay):
             One of a figure's subplots is divided into the panels; or one axes a panel. None
             makes a figure.
         frame : int, default=None
-            A frame of the longest performance; the others are drawn at the same time. By default
+            A frame of the longest trial; the others are drawn at the same time. By default
             the last.
         azimuth : float, default=-60
             The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
@@ -305,18 +305,18 @@ class PhaseDisplay(MovingDisplay):
         PhaseDisplay
             The display itself.
         """
-        longest = max((p.times for p in self.performances), key=lambda times: times[-1])
+        longest = max((p.times for p in self.trials), key=lambda times: times[-1])
         last = len(longest) - 1
         self._time = longest[last if frame is None else as_index(frame, last + 1, "frame")]
         self._azimuth = azimuth
         return super().plot(ax)
 
     def _has_bodies(self):
-        return self.performances[0].body is not None
+        return self.trials[0].body is not None
 
     def _layout(self):
         # Two panels beside each other; an odd last one has the whole width.
-        n_panels, count = self._has_bodies() + 2 + len(self.features), len(self.performances)
+        n_panels, count = self._has_bodies() + 2 + len(self.features), len(self.trials)
         places = [divmod(i, 2) for i in range(n_panels)]
         if n_panels % 2:
             places[-1] = (n_panels // 2, slice(None))
@@ -325,12 +325,12 @@ class PhaseDisplay(MovingDisplay):
         return cells, (count * each, 2), (WIDTH, count * each * _ROW + 0.3)
 
     def _draw(self):
-        end = max(self.action.end_of(p) for p in self.performances)
-        by_row = np.array(self.axes_, dtype=object).reshape(len(self.performances), -1)
+        end = max(self.action.end_of(p) for p in self.trials)
+        by_row = np.array(self.axes_, dtype=object).reshape(len(self.trials), -1)
         curves_from = self._has_bodies() + 1
         self.rows_ = []
-        for axes, p in zip(by_row, self.performances, strict=True):
-            row = PerformanceRow(axes, p, self.action, self.skeleton, self.features, self._azimuth)
+        for axes, p in zip(by_row, self.trials, strict=True):
+            row = TrialRow(axes, p, self.action, self.skeleton, self.features, self._azimuth)
             self.rows_.append(row)
             axes[0].set_title(fill(p.name, _LINE_LENGTH), fontsize="medium", parse_math=False)
             for axis in axes[curves_from:]:
@@ -342,7 +342,7 @@ class PhaseDisplay(MovingDisplay):
             legend_above([axis], *axis.get_legend_handles_labels(), n_cols=2)
 
     def _show(self, share):
-        time = share * max(p.times[-1] for p in self.performances)
+        time = share * max(p.times[-1] for p in self.trials)
         for row in self.rows_:
             row.show(time)
 
@@ -366,7 +366,7 @@ def _as_list_of_phases(phases) -> list[LivePhase]:
 
 
 def _final_phases(live, x):
-    """The phases of the frames of a performance as they are known at its end."""
+    """The phases of the frames of a trial as they are known at its end."""
     (tau,) = live.synchronizer_.match([x]).times
     clock = np.arange(live.n_frames_)
     # Where tau is constant, all phases in between are equally right.
@@ -374,7 +374,7 @@ def _final_phases(live, x):
 
 
 def _spread(live, training):
-    """The standard deviation (P, n_features) of the training performances from their mean."""
+    """The standard deviation (P, n_features) of the training trials from their mean."""
     match = live.synchronizer_.match(training)
     return np.asarray(match.warp(training)).reshape(-1, *live.mean_.shape).std(axis=0)
 
@@ -383,7 +383,7 @@ def _spread(live, training):
 
 
 class LearntAction(NamedTuple):
-    """The learnt action, and what it predicts of a running performance.
+    """The learnt action, and what it predicts of a running trial.
 
     Attributes
     ----------
@@ -428,10 +428,10 @@ class LearntAction(NamedTuple):
             out.append(course.time_left()[0])
         return np.array(out)
 
-    def end_of(self, performance):
-        """The latest time observed or predicted of a performance."""
-        times = performance.times
-        expected = times + np.where(performance.phase < self.n_frames - 1, performance.left, 0)
+    def end_of(self, trial):
+        """The latest time observed or predicted of a trial."""
+        times = trial.times
+        expected = times + np.where(trial.phase < self.n_frames - 1, trial.left, 0)
         return max(times[-1], expected.max())
 
     def predict(self, phase, now, left):
@@ -442,8 +442,8 @@ class LearntAction(NamedTuple):
         return now + np.linspace(0, left, _N_POINTS), np.linspace(phase, last, _N_POINTS)
 
 
-class RunningPerformance(NamedTuple):
-    """A performance with its phases.
+class RunningTrial(NamedTuple):
+    """A trial with its phases.
 
     Attributes
     ----------
@@ -484,13 +484,13 @@ class RunningPerformance(NamedTuple):
         return cls(*values, cycle, times, left, **others)
 
 
-class PerformanceRow:
-    """The panels of one performance: a body if there is one, a dial, the phase, curves.
+class TrialRow:
+    """The panels of one trial: a body if there is one, a dial, the phase, curves.
 
     Parameters
     ----------
     axes : list of Axes
-    performance : RunningPerformance
+    trial : RunningTrial
     action : LearntAction
     skeleton : Skeleton or None
         The skeleton of the bodies.
@@ -499,12 +499,12 @@ class PerformanceRow:
     azimuth : float
     """
 
-    def __init__(self, axes, performance, action, skeleton, features, azimuth):
-        self.axes, self._performance, self._action = list(axes), performance, action
+    def __init__(self, axes, trial, action, skeleton, features, azimuth):
+        self.axes, self._trial, self._action = list(axes), trial, action
         axes, self.body = list(axes), None
-        if performance.body is not None:
+        if trial.body is not None:
             self._bodies, self._mean = (
-                project(x, skeleton, azimuth) for x in (performance.body, action.body)
+                project(x, skeleton, azimuth) for x in (trial.body, action.body)
             )
             places = [x.reshape(-1, 2) for x in (self._bodies, self._mean)]
             stage(axes[0], "", *bounds(np.concatenate(places)))
@@ -513,21 +513,21 @@ class PerformanceRow:
         self._time_axes = axes
         self._draw_phase(axes[0])
         self.curves = [
-            FeaturePanel(axis, performance, action, k, name)
+            FeaturePanel(axis, trial, action, k, name)
             for k, (axis, name) in enumerate(zip(axes[1:], features, strict=True))
         ]
 
     def _draw_phase(self, axis):
-        grey, blue, orange = (COLORS[k] for k in ("shadow", "performance", "mean"))
+        grey, blue, orange = (COLORS[k] for k in ("shadow", "trial", "mean"))
         self.confidence = _empty_area(axis, grey, 0.75, "confidence")
         self.afterwards = None
-        performance, percent = self._performance, 100 / (self._action.n_frames - 1)
-        label = _label("90 % band", performance.lower)
+        trial, percent = self._trial, 100 / (self._action.n_frames - 1)
+        label = _label("90 % band", trial.lower)
         self.interval = _empty_area(axis, blue, _INTERVAL_OPACITY, label)
-        if performance.afterwards is not None:
-            ys = percent * performance.afterwards
+        if trial.afterwards is not None:
+            ys = percent * trial.afterwards
             (self.afterwards,) = axis.plot(
-                performance.times,
+                trial.times,
                 ys,
                 label="afterwards",
                 color=COLORS["pattern"],
@@ -544,7 +544,7 @@ class PerformanceRow:
 
     def show(self, time):
         """Move to a time."""
-        p, action = self._performance, self._action
+        p, action = self._trial, self._action
         now = max(np.searchsorted(p.times, time, side="right") - 1, 0)
         phase, rate, confidence = (x[now] for x in (p.phase, p.rate, p.confidence))
         last, past = action.n_frames - 1, slice(now + 1)
@@ -603,7 +603,7 @@ class PhaseDial:
             )
 
         ring(COLORS["shadow"], *_RING, end=-270)
-        self.passed = ring(COLORS["performance"], *_RING, end=90)
+        self.passed = ring(COLORS["trial"], *_RING, end=90)
         self.ahead = ring(COLORS["mean"], *_ARC, end=90)
         for quarter, text in enumerate(("0 %", "25", "50", "75")):
             angle, radius = np.pi * quarter / 2, _NUMBERS + 0.02 * (quarter % 2)
@@ -630,10 +630,10 @@ class PhaseDial:
 class FeaturePanel:
     """A feature as it was observed, and its prediction."""
 
-    def __init__(self, axis, performance, action, k, name):
-        self._times, self._seen = performance.times, performance.seen[:, k]
+    def __init__(self, axis, trial, action, k, name):
+        self._times, self._seen = trial.times, trial.seen[:, k]
         self._action, self._k = action, k
-        blue, orange = COLORS["performance"], COLORS["mean"]
+        blue, orange = COLORS["trial"], COLORS["mean"]
         self.band = _empty_area(axis, COLORS["envelope"], 0.35, _label("90 % band", action.spread))
         (self.to_come,) = axis.plot(
             self._times,

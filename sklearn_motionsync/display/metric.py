@@ -39,8 +39,8 @@ class MetricDisplay(Display):
         Its share in the velocities, which are compared without a metric.
     feature_names : list of str
         One name a row.
-    n_performances : int
-        The number of performances from which the metric was learnt.
+    n_trials : int
+        The number of trials from which the metric was learnt.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class MetricDisplay(Display):
     share: np.ndarray
     energy: np.ndarray
     feature_names: Sequence[str]
-    n_performances: int
+    n_trials: int
 
     def __repr__(self):
         return f"MetricDisplay({counted(len(self.feature_names), 'row')}, {self._describe()})"
@@ -86,7 +86,7 @@ class MetricDisplay(Display):
         Parameters
         ----------
         estimator : DenseSynchronizer, or Pipeline with one
-            Fitted. The performances are not needed again.
+            Fitted. The trials are not needed again.
         features : int, str or list of them, default=None
             Features by index or name, as they reach the synchronizer, such as dimensions of the
             aSpace. By default all, in the order of the larger of the two shares; of more than 20
@@ -117,7 +117,7 @@ class MetricDisplay(Display):
             chosen = choose_features(features, names)
             names, shares = [names[i] for i in chosen], shares[chosen]
         share, energy = shares.T
-        return cls(share, energy, names, len(metric.performances)).plot(ax)
+        return cls(share, energy, names, len(metric.trials)).plot(ax)
 
     def _layout(self):
         return [(0, 0)], (1, 1), (WIDTH, max(2.2, 0.27 * len(self.share) + 1.3))
@@ -139,7 +139,7 @@ class MetricDisplay(Display):
             self.share,
             label="with the learnt weights",
             height=0.4,
-            color=COLORS["performance"],
+            color=COLORS["trial"],
         )
         axis.axvline(0, color="0.3", linewidth=0.8)
         axis.set_yticks(rows, self.feature_names)
@@ -150,7 +150,7 @@ class MetricDisplay(Display):
         axis.grid(False, axis="y")
 
     def _describe(self):
-        return f"metric learnt from {counted(self.n_performances, 'trial')}"
+        return f"metric learnt from {counted(self.n_trials, 'trial')}"
 
 
 def _sort_and_sum(names, shares):
@@ -170,8 +170,8 @@ def _explain_missing(synchronizer):
     values = {name: getattr(synchronizer, name) for name in ("metric", "cost", "consensus")}
     return (
         "There is no metric to draw, metric_ is None: DenseSynchronizer learns one with "
-        "metric='learned', cost='velocity' and consensus above 0, from at least 3 performances "
+        "metric='learned', cost='velocity' and consensus above 0, from at least 3 trials "
         f"in which something moves. It has {', '.join(f'{k}={v!r}' for k, v in values.items())} "
-        f"and was fitted to {counted(n, 'performance')}; change what is missing and fit it "
+        f"and was fitted to {counted(n, 'trial')}; change what is missing and fit it "
         "again."
     )

@@ -11,7 +11,7 @@ from sklearn.base import BaseEstimator
 
 from ..inputs.collections import as_collection
 from ..inputs.features import choose_features
-from ..inputs.types import Features, PerformancesLike, Unit, ValuesLike
+from ..inputs.types import Features, TrialsLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..model.action_model import ActionModel
 from ..model.views import view_of
@@ -36,7 +36,7 @@ __all__ = ["ActionModelDisplay"]
 # Titles of the legend.
 _BAND_TITLES = {
     "points": "band holds single poses, not whole trials",
-    "performances": "band holds {:.3g} % of new people's trials",
+    "trials": "band holds {:.3g} % of new people's trials",
     "mean": "band holds the mean of all people, {:.3g} % sure",
 }
 # Rounding of the largest bound, in units of the last place.
@@ -45,7 +45,7 @@ _ROUNDING = 64
 
 @dataclass(eq=False, repr=False)
 class ActionModelDisplay(Display):
-    """A learnt action: its mean, a band about it, and the performances behind (Fig. 3d).
+    """A learnt action: its mean, a band about it, and the trials behind (Fig. 3d).
 
     Use `from_estimator`.
 
@@ -53,7 +53,7 @@ class ActionModelDisplay(Display):
     ----------
     mean, lower, upper : ndarray, shape (P, n_shown)
         The mean of the model, and the bounds of the band.
-    performances : ndarray, shape (n_sequences, P, n_shown), or None
+    trials : ndarray, shape (n_sequences, P, n_shown), or None
         Synchronised.
     axis : TimeAxis
         The clock of the pattern, and the key-frames on it.
@@ -62,7 +62,7 @@ class ActionModelDisplay(Display):
     titles : (str, str)
         What the band holds and what it is, for the legend.
     departures : bool
-        Whether the parts of performances outside the band are violet.
+        Whether the parts of trials outside the band are violet.
 
     Attributes
     ----------
@@ -72,10 +72,10 @@ class ActionModelDisplay(Display):
         The means, one a feature.
     envelope_ : list of FillBetweenPolyCollection
         The bands, one a feature.
-    performances_ : list of LineCollection
-        The performances, one collection a feature; empty without performances.
+    trials_ : list of LineCollection
+        The trials, one collection a feature; empty without trials.
     departures_ : list of LineCollection
-        The parts of performances outside the band; empty if they are not drawn.
+        The parts of trials outside the band; empty if they are not drawn.
     keyframes_ : list of list of Line2D
         The key-frames, for each panel; empty without any.
 
@@ -96,7 +96,7 @@ class ActionModelDisplay(Display):
     mean: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-    performances: np.ndarray | None
+    trials: np.ndarray | None
     axis: TimeAxis
     ylabels: Sequence[str]
     titles: tuple[str, str]
@@ -109,10 +109,10 @@ class ActionModelDisplay(Display):
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike | None = None,
+        X: TrialsLike | None = None,
         *,
         features: Features | None = None,
-        band: Literal["points", "performances", "mean"] | None = None,
+        band: Literal["points", "trials", "mean"] | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
         ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
@@ -127,23 +127,23 @@ class ActionModelDisplay(Display):
         ----------
         estimator : ActionModel, or Pipeline with one
             Fitted.
-        X : performances, default=None
+        X : trials, default=None
             As the estimator takes them; drawn behind, as they reach the model.
         features : int, str or list of them, default=None
             Features of the model, by index or name. In a pipeline with an `ASpace` they may also
-            be features of the postures, such as ``"pelvis_height"``: the model is then fitted again
-            on the postures of the performances that it keeps. By default the first four of the
+            be features of the poses, such as ``"pelvis_height"``: the model is then fitted again
+            on the poses of the trials that it keeps. By default the first four of the
             model. What scalers before the model do to its own features is undone.
-        band : {"points", "performances", "mean"}, default=None
-            The band about the mean, which holds postures of new subjects one by one
-            (`ActionModel.envelope`); or their performances from the first frame to the last, with
+        band : {"points", "trials", "mean"}, default=None
+            The band about the mean, which holds poses of new subjects one by one
+            (`ActionModel.envelope`); or their trials from the first frame to the last, with
             probability ``coverage`` of the model (``simultaneous=True``); or the mean of the
-            population (`ActionModel.mean_envelope`). In features of postures it includes what the
-            `ASpace` leaves out. By default ``"performances"``, without X ``"points"``. Parts of
-            performances outside the band are violet, except that of the mean.
+            population (`ActionModel.mean_envelope`). In features of poses it includes what the
+            `ASpace` leaves out. By default ``"trials"``, without X ``"points"``. Parts of
+            trials outside the band are violet, except that of the mean.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames or per cent of the pattern, or seconds; the clock then lasts
-            as long as the median performance of X.
+            as long as the median trial of X.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X as recorded, for seconds, by default what tables tell, as in
             `Match.to_frame`; without X those of the clock. Key-frames are then in seconds, as for
@@ -169,24 +169,24 @@ class ActionModelDisplay(Display):
         ValueError
             If there is no such feature or band.
         TypeError
-            If further arguments come without performances.
+            If further arguments come without trials.
 
         See Also
         --------
         SkeletonDisplay.from_departures : The limbs that depart, on stick figures.
-        GroupDisplay : Groups of performances, with their means and bands.
+        GroupDisplay : Groups of trials, with their means and bands.
         """
         if band is None:
-            band = "points" if X is None else "performances"
+            band = "points" if X is None else "trials"
         if band not in list(_BAND_TITLES):
             raise ValueError(f"band must be one of {list(_BAND_TITLES)}, got {band!r}.")
         caller = f"{cls.__name__}.from_estimator"
         if X is None and params:
-            raise TypeError(f"{caller} takes {', '.join(params)} along with performances X only.")
+            raise TypeError(f"{caller} takes {', '.join(params)} along with trials X only.")
         params = with_frame_rate(params, frame_rate)
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
-        shown = view.whole if band == "performances" else view.synchronised
+        shown = view.whole if band == "trials" else view.synchronised
         lower, upper, what = _band_of(view, band)
         drawn: list = [view.model.mean_, lower, upper, *(() if shown is None else shown)]
         n_frames, lengths, rates = len(view.model.mean_), None, frame_rate
@@ -195,7 +195,7 @@ class ActionModelDisplay(Display):
             before, model = find_step(estimator, ActionModel)
             undo, known_units = undo_scaling(before, X, model.mean_.shape[1])
             drawn = [undo(x) for x in drawn]
-        mean, lower, upper, *performances = (x[:, chosen] for x in drawn)
+        mean, lower, upper, *trials = (x[:, chosen] for x in drawn)
         if unit == "seconds" and X is not None:
             lengths, rates = _lengths(X), rates_of(X, frame_rate)
         keyframes = _keyframes_of(estimator, n_frames, params.get("keyframes"))
@@ -203,7 +203,7 @@ class ActionModelDisplay(Display):
             mean,
             lower,
             upper,
-            np.stack(performances) if performances else None,
+            np.stack(trials) if trials else None,
             TimeAxis(unit, n_frames, lengths, rates, xlabel, keyframes=keyframes),
             labels_of_signals([view.names[i] for i in chosen], known_units, ylabel, units),
             (_BAND_TITLES[band].format(100 * view.model.coverage), what),
@@ -218,7 +218,7 @@ class ActionModelDisplay(Display):
         return cells, (n_rows, n_cols), (WIDTH, max(3, 1.9 * n_rows + 1.4))
 
     def _draw(self):
-        self.mean_, self.envelope_, self.performances_, self.departures_ = empty_lists(4)
+        self.mean_, self.envelope_, self.trials_, self.departures_ = empty_lists(4)
         for i, axis in enumerate(self.axes_):
             self._draw_feature(axis, i)
         n_cols = self._layout()[1][1]
@@ -227,28 +227,28 @@ class ActionModelDisplay(Display):
         self._draw_legend(n_cols)
 
     def _draw_feature(self, axis, i):
-        """Draw the band of a feature, then performances, departures, and the mean."""
+        """Draw the band of a feature, then trials, departures, and the mean."""
         clock = self.axis.clock
         bounds, grey = (self.lower[:, i], self.upper[:, i]), COLORS["envelope"]
         band = axis.fill_between(clock, *bounds, color=grey, alpha=0.35, linewidth=0)
         self.envelope_.append(band)
         for bound in bounds:
             axis.plot(clock, bound, color=COLORS["pattern"], linewidth=0.9)
-        if self.performances is not None:
-            behind = self.performances[:, :, i]
+        if self.trials is not None:
+            behind = self.trials[:, :, i]
             lines = curves(
                 axis,
                 [clock] * len(behind),
                 behind,
-                colors=COLORS["performance"],
+                colors=COLORS["trial"],
                 linestyles="dashed",
                 linewidths=0.7,
                 alpha=0.5,
             )
-            self.performances_.append(lines)
+            self.trials_.append(lines)
         if self.departures:
             lower, upper = (bound[:, i] for bound in self._outer_bounds())
-            xs, ys = parts_outside(self.performances[:, :, i], lower, upper)
+            xs, ys = parts_outside(self.trials[:, :, i], lower, upper)
             self.departures_.append(
                 curves(
                     axis,
@@ -271,12 +271,12 @@ class ActionModelDisplay(Display):
         """Draw a legend above the panels, with the meaning of the band as its title."""
         title, what = self.titles
         handles, labels = [self.envelope_[0]], [what]
-        if self.performances is not None:
-            handles.append(self.performances_[0])
-            labels.append(counted(len(self.performances), "trial"))
+        if self.trials is not None:
+            handles.append(self.trials_[0])
+            labels.append(counted(len(self.trials), "trial"))
         if self.departures:
             lower, upper = self._outer_bounds()
-            outside = (self.performances < lower) | (self.performances > upper)
+            outside = (self.trials < lower) | (self.trials > upper)
             handles.append(self.departures_[0])
             labels.append(f"outside the band: {outside.any(axis=(1, 2)).sum()} of them")
         below = self.axes_[:n_cols]
@@ -295,7 +295,7 @@ def _keyframes_of(estimator, n_frames, keyframes):
 
 
 def _lengths(X):
-    """The numbers of frames of performances, or of univariate rows."""
+    """The numbers of frames of trials, or of univariate rows."""
     collection = as_collection(X)
     if collection is None:
         n_sequences, n_frames = np.shape(X)

@@ -11,10 +11,10 @@ import pandas as pd
 from sklearn.base import BaseEstimator
 
 from ..inputs.tables import labels_of
-from ..inputs.types import PerformanceLike, PerformancesLike
+from ..inputs.types import TrialLike, TrialsLike
 from ..inputs.wording import counted
-from ..segmentation.search import find_performances
-from .arguments import as_performances
+from ..segmentation.search import find_trials
+from .arguments import as_trials
 from .base import COLORS, WIDTH, AxesLike, Display, legend_above
 
 __all__ = ["SearchDisplay"]
@@ -29,7 +29,7 @@ _MAX_PANELS = 12
 class SearchDisplay(Display):
     """The hits of a search along takes: their times, scores, and the threshold.
 
-    Use `from_estimator`, or `from_predictions` with the result of `find_performances`.
+    Use `from_estimator`, or `from_predictions` with the result of `find_trials`.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ class SearchDisplay(Display):
     @classmethod
     def from_estimator(
         cls,
-        pattern: BaseEstimator | PerformanceLike,
-        X: PerformancesLike,
+        pattern: BaseEstimator | TrialLike,
+        X: TrialsLike,
         *,
         segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
         xlabel: str | None = None,
@@ -85,10 +85,10 @@ class SearchDisplay(Display):
 
         Parameters
         ----------
-        pattern : performances, or estimator
-            The pattern of `find_performances`.
+        pattern : trials, or estimator
+            The pattern of `find_trials`.
         X : takes
-            The takes of `find_performances`.
+            The takes of `find_trials`.
         segments : DataFrame or list of (take, start, stop), default=None
             True segments of the action, by the labels of the takes.
         xlabel : str, default=None
@@ -96,7 +96,7 @@ class SearchDisplay(Display):
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            Arguments of `find_performances`, without ``threshold``: the figure shows the hits
+            Arguments of `find_trials`, without ``threshold``: the figure shows the hits
             above and below the automatic one.
 
         Returns
@@ -104,25 +104,25 @@ class SearchDisplay(Display):
         SearchDisplay
             The display, drawn.
         """
-        _, origin = find_performances(pattern, X, threshold=None, **params)
+        _, origin = find_trials(pattern, X, threshold=None, **params)
         return cls.from_predictions(origin, X, segments=segments, xlabel=xlabel, ax=ax)
 
     @classmethod
     def from_predictions(
         cls,
         origin: pd.DataFrame,
-        X: PerformancesLike,
+        X: TrialsLike,
         *,
         segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
         xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
-        """Draw the result of `find_performances`.
+        """Draw the result of `find_trials`.
 
         Parameters
         ----------
         origin : DataFrame
-            The second result of `find_performances`.
+            The second result of `find_trials`.
         X : takes
             The takes that were searched.
         segments : DataFrame or list of (take, start, stop), default=None
@@ -142,7 +142,7 @@ class SearchDisplay(Display):
         ValueError
             If hits or segments are of other takes.
         """
-        takes = as_performances(X)
+        takes = as_trials(X)
         lengths = dict(zip(labels_of(takes)[0], map(len, takes), strict=True))
         true = None
         if segments is not None:
@@ -177,7 +177,7 @@ class SearchDisplay(Display):
             ):
                 height = max(score - _BOTTOM, 0)
                 boxes.append(Rectangle((start, _BOTTOM), stop - start, height))
-                colors.append(COLORS["performance"] if is_hit else COLORS["shadow"])
+                colors.append(COLORS["trial"] if is_hit else COLORS["shadow"])
             self.hits_.append(PatchCollection(boxes, facecolors=colors, edgecolors="white"))
             axis.add_collection(self.hits_[-1])
             self._draw_segments(axis, take)
@@ -208,7 +208,7 @@ class SearchDisplay(Display):
         from matplotlib.patches import Patch
 
         handles = [
-            Patch(facecolor=COLORS["performance"], label="hit"),
+            Patch(facecolor=COLORS["trial"], label="hit"),
             Patch(facecolor=COLORS["shadow"], label="below the threshold"),
             Line2D([], [], color=COLORS["mean"], linestyle="--", label="threshold"),
         ]

@@ -1,4 +1,4 @@
-"""SkeletonDisplay: stick figures of postures, models (Fig. 4), and performances in motion."""
+"""SkeletonDisplay: stick figures of poses, models (Fig. 4), and trials in motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.skeleton import Skeleton
-from ..inputs.types import PerformancesLike, RandomState
+from ..inputs.types import RandomState, TrialsLike
 from ..inputs.wording import counted
 from ..matching.counting import whole
 from ..model.action_model import ActionModel
@@ -29,7 +29,7 @@ from .arguments import (
     as_frames,
     as_indices,
     as_names,
-    as_performances,
+    as_trials,
     labels_as_text,
 )
 from .base import WIDTH, AxesLike
@@ -43,7 +43,7 @@ from .bodies import (
 )
 from .limb_departures import draw_departures, split_at_synchronizer
 
-__all__ = ["SkeletonDisplay", "postures_at"]
+__all__ = ["SkeletonDisplay", "poses_at"]
 
 # The largest number of panels in a row.
 _PANELS_A_ROW = 4
@@ -51,20 +51,20 @@ _PANELS_A_ROW = 4
 _HEADING, _LINE_LENGTH = 0.6, 78
 # The distance of bodies side by side, in heights of the tallest.
 _SPACING = 0.7
-# The number of performances by default.
-_N_PERFORMANCES = 6
+# The number of trials by default.
+_N_TRIALS = 6
 
 
 @dataclass(eq=False, repr=False)
 class SkeletonDisplay(MovingDisplay):
-    """Stick figures of joint positions: postures side by side, or performances in motion.
+    """Stick figures of joint positions: poses side by side, or trials in motion.
 
-    Make one with `from_positions` (postures), `from_model` (Fig. 4), `from_departures` (departures
-    of a performance from an action), `from_performances` or `from_estimator` (performances, also
+    Make one with `from_positions` (poses), `from_model` (Fig. 4), `from_departures` (departures
+    of a trial from an action), `from_trials` or `from_estimator` (trials, also
     before and after synchronisation, to `animate`). Left limbs are blue, right ones orange. Where
     limbs depart from an action these are violet and all others grey. Bodies face the same way in
     the first frame, and their lowest joint of all frames is on the floor. The view follows the
-    pelvis of single postures, and of a body that walks far.
+    pelvis of single poses, and of a body that walks far.
 
     A skeleton may lack landmarks. Where a landmark is the mean of joints, limbs are drawn between
     the landmarks; the joints of a skeleton without bones are drawn as points. Positions in a plane
@@ -73,22 +73,22 @@ class SkeletonDisplay(MovingDisplay):
     Parameters
     ----------
     scenes : list of list of ndarray (n_frames_i, n_joints, n_dims)
-        The performances of each panel: joint positions in axes of which the second is vertical.
+        The trials of each panel: joint positions in axes of which the second is vertical.
     skeleton : Skeleton or None
         Joints and bones; None draws all joints as points, without bones.
     titles : list of str
         One a panel.
     durations : list of list of float, default=None
-        The duration of each performance of each panel in frames; by default its number of frames
+        The duration of each trial of each panel in frames; by default its number of frames
         less one.
     labels : list of str, default=None
-        Names under the performances of a panel, which are then side by side instead of in one
+        Names under the trials of a panel, which are then side by side instead of in one
         place.
     marked : list of list of (int, int), default=None
         The violet bones of each panel, such as those of limbs that depart from the action: pairs
         of ``skeleton.bones``. All others are grey.
     behind : list of list of ndarray (n_frames_i, n_joints, n_dims), default=None
-        Performances of each panel that are drawn behind as pale shadows, such as the mean.
+        Trials of each panel that are drawn behind as pale shadows, such as the mean.
     heading : str, default=None
         The heading of a figure that the display makes.
 
@@ -131,14 +131,14 @@ class SkeletonDisplay(MovingDisplay):
     @classmethod
     def from_positions(
         cls,
-        X: PerformancesLike,
+        X: TrialsLike,
         skeleton: Skeleton | None,
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
         azimuth: float = -60,
     ) -> Self:
-        """Draw postures of one performance, or of synchronised ones over each other.
+        """Draw poses of one trial, or of synchronised ones over each other.
 
         Parameters
         ----------
@@ -161,17 +161,17 @@ class SkeletonDisplay(MovingDisplay):
         """
         bodies = [
             place_on_floor(read_positions(x, skeleton, i), skeleton, follow=True)
-            for i, x in enumerate(as_performances(X))
+            for i, x in enumerate(as_trials(X))
         ]
         shown = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in shown]
-        display = cls(postures_at(shown, bodies), skeleton, titles)
+        display = cls(poses_at(shown, bodies), skeleton, titles)
         return display.plot(ax, azimuth=azimuth)
 
     @classmethod
-    def from_performances(
+    def from_trials(
         cls,
-        X: PerformancesLike,
+        X: TrialsLike,
         skeleton: Skeleton | None,
         *,
         match: Match | None = None,
@@ -180,7 +180,7 @@ class SkeletonDisplay(MovingDisplay):
         at: float = 0.0,
         azimuth: float = -60,
     ) -> Self:
-        """Draw performances side by side, each at its own pace, such as two subjects and a blend.
+        """Draw trials side by side, each at its own pace, such as two subjects and a blend.
 
         Parameters
         ----------
@@ -189,10 +189,10 @@ class SkeletonDisplay(MovingDisplay):
         skeleton : Skeleton or None
             None draws the joints as points without bones, y up.
         match : Match, default=None
-            That of the performances, such as ``synchronizer.match(points)``: below them the same
+            That of the trials, such as ``synchronizer.match(points)``: below them the same
             ones are drawn aligned.
         names : list of str, default=None
-            The names under the performances; by default their labels in X, or numbers.
+            The names under the trials; by default their labels in X, or numbers.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         at : float in [0, 1], default=0.0
@@ -205,10 +205,10 @@ class SkeletonDisplay(MovingDisplay):
         SkeletonDisplay
             The display, drawn at the beginning; see `animate`.
         """
-        X = as_performances(X)
+        X = as_trials(X)
         bodies = [place_on_floor(read_positions(x, skeleton, i), skeleton) for i, x in enumerate(X)]
         names = labels_as_text(X) if names is None else names
-        labels = as_names(names, len(X), "names", "performances")
+        labels = as_names(names, len(X), "names", "trials")
         scenes, titles, durations = [bodies], ["each at its own pace"], None
         if match is not None:
             warped = match.warp([x.reshape(len(x), -1) for x in bodies])
@@ -222,15 +222,15 @@ class SkeletonDisplay(MovingDisplay):
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: TrialsLike,
         *,
-        performances: Sequence[int] | np.ndarray | None = None,
+        trials: Sequence[int] | np.ndarray | None = None,
         ax: AxesLike | None = None,
         at: float = 0.0,
         azimuth: float = -60,
         **params: Any,
     ) -> Self:
-        """Draw performances as recorded above the same ones synchronised by a pipeline.
+        """Draw trials as recorded above the same ones synchronised by a pipeline.
 
         Parameters
         ----------
@@ -238,8 +238,8 @@ class SkeletonDisplay(MovingDisplay):
             Fitted, from `DirectionCosines`, `JointPositions` or both to a synchronizer or further.
         X : list of arrays (n_frames_i, n_dims * n_joints)
             Joint positions.
-        performances : list of int, default=None
-            The indices of the performances; by default the pattern, if it is one of them, and
+        trials : list of int, default=None
+            The indices of the trials; by default the pattern, if it is one of them, and
             others up to six in all.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
@@ -258,16 +258,16 @@ class SkeletonDisplay(MovingDisplay):
         _, views = split_at_synchronizer(estimator)
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         match = reached.match()
-        pattern = index_of_pattern(reached.synchronizer, reached.performances)
-        if performances is None:
+        pattern = index_of_pattern(reached.synchronizer, reached.trials)
+        if trials is None:
             pattern_first = sorted(range(len(match.times)), key=lambda i: i != pattern)
-            performances = pattern_first[:_N_PERFORMANCES]
-        performances = as_indices(performances, len(match.times), "performances")
-        return cls.from_performances(
-            [as_performances(X)[i] for i in performances],
+            trials = pattern_first[:_N_TRIALS]
+        trials = as_indices(trials, len(match.times), "trials")
+        return cls.from_trials(
+            [as_trials(X)[i] for i in trials],
             views[0].skeleton,
-            match=Match(match.times[performances]),
-            names=[f"{i} (template)" if i == pattern else str(i) for i in performances],
+            match=Match(match.times[trials]),
+            names=[f"{i} (pattern)" if i == pattern else str(i) for i in trials],
             ax=ax,
             at=at,
             azimuth=azimuth,
@@ -284,7 +284,7 @@ class SkeletonDisplay(MovingDisplay):
         ax: AxesLike | None = None,
         azimuth: float = -60,
     ) -> Self:
-        """Draw mean postures of a model, and random postures that it accepts (Fig. 4).
+        """Draw mean poses of a model, and random poses that it accepts (Fig. 4).
 
         Parameters
         ----------
@@ -294,9 +294,9 @@ class SkeletonDisplay(MovingDisplay):
         frames : list of int or float, default=(0.1, 0.4)
             Frames of the model; fractions below 1 are shares of the action.
         n_samples : int, default=12
-            The number of random postures at each frame; those that the model accepts are drawn.
+            The number of random poses at each frame; those that the model accepts are drawn.
         random_state : int, RandomState instance or None, default=None
-            Determines the random postures; None draws others each time.
+            Determines the random poses; None draws others each time.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         azimuth : float, default=-60
@@ -317,7 +317,7 @@ class SkeletonDisplay(MovingDisplay):
                 "from_positions with bodies of your own."
             )
         skeleton = views[0].skeleton.body()
-        # Features that a synchronizer adds are not part of a posture.
+        # Features that a synchronizer adds are not part of a pose.
         width = find_synchronizer(estimator)[1].pattern_.shape[1]
         mean = model.mean_[:, :width]
 
@@ -344,24 +344,24 @@ class SkeletonDisplay(MovingDisplay):
     def from_departures(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: TrialsLike,
         *,
-        performance: int = 0,
+        trial: int = 0,
         frames: int | Sequence[int] | np.ndarray = 6,
         limit: float | None = None,
-        reference: PerformancesLike | None = None,
+        reference: TrialsLike | None = None,
         ax: AxesLike | None = None,
         azimuth: float = -60,
         **params: Any,
     ) -> Self:
-        """Draw what is wrong with a performance: when, and with which limbs.
+        """Draw what is wrong with a trial: when, and with which limbs.
 
-        The figure shows postures of the performance on the clock of the model, before pale shadows
+        The figure shows poses of the trial on the clock of the model, before pale shadows
         of what is expected. Limbs that depart are violet: those of the rows of `find_departures`
         that are rare; without one, and without ``limit``, those of all rows if the model refuses
-        the performance, and otherwise none; for the height of the pelvis the hips are marked.
+        the trial, and otherwise none; for the height of the pelvis the hips are marked.
         Titles tell the most important departure: the limb, and by how much it is off, late, or
-        moves too little or too far. The heading says whether the model accepts the performance, and
+        moves too little or too far. The heading says whether the model accepts the trial, and
         what is rare; it may accept it although limbs depart, because it evaluates only what the
         `ASpace` keeps, and the heading then says so.
 
@@ -373,8 +373,8 @@ class SkeletonDisplay(MovingDisplay):
             one part of a union, whose other features count for the decision and are not drawn.
         X : list of arrays (n_frames_i, n_dims * n_joints)
             Joint positions.
-        performance : int, default=0
-            The index of the performance.
+        trial : int, default=0
+            The index of the trial.
         frames : int or list of int, default=6
             A number cuts the clock into as many equal parts, each shown at the peak of its most
             important departure, or in its middle without one. A list gives frames of the model,
@@ -382,8 +382,8 @@ class SkeletonDisplay(MovingDisplay):
             away. A limb is marked if it departs anywhere in its part.
         limit : float, default=None
             As for `find_departures`.
-        reference : performances, default=None
-            One to five right performances of the same person, as for `find_departures`.
+        reference : trials, default=None
+            One to five right trials of the same person, as for `find_departures`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         azimuth : float, default=-60
@@ -399,20 +399,20 @@ class SkeletonDisplay(MovingDisplay):
         Raises
         ------
         ValueError
-            If there is no such performance or frame, ``limit`` is not above 0, or the features of
+            If there is no such trial or frame, ``limit`` is not above 0, or the features of
             the model cannot be inverted to those of `DirectionCosines`.
 
         See Also
         --------
         sklearn_motionsync.find_departures : The departures as a table.
-        ActionModelDisplay : The curves of the performance, and the band that they leave.
+        ActionModelDisplay : The curves of the trial, and the band that they leave.
         """
         scenes, skeleton, titles, marked, behind, heading = draw_departures(
             estimator,
             X,
             params,
             f"{cls.__name__}.from_departures",
-            performance=performance,
+            trial=trial,
             frames=frames,
             limit=limit,
             reference=reference,
@@ -514,9 +514,9 @@ class SkeletonDisplay(MovingDisplay):
             panel.show(bodies, [x[whole(at * (len(x) - 1))] for x in behind])
 
 
-def postures_at(frames, performances):
-    """Scenes of single postures: for each frame a panel with those of all performances."""
-    return [[x[[frame]] for x in performances] for frame in frames]
+def poses_at(frames, trials):
+    """Scenes of single poses: for each frame a panel with those of all trials."""
+    return [[x[[frame]] for x in trials] for frame in frames]
 
 
 def _frames_of_model(frames, n_frames):

@@ -13,7 +13,7 @@ from ..inputs.collections import as_collection
 from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import check_finite, nanmean
-from ..inputs.types import Features, Labels, NumbersLike, PerformancesLike, Unit, ValuesLike
+from ..inputs.types import Features, Labels, NumbersLike, TrialsLike, Unit, ValuesLike
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..synchronizers.match import Match, check_coverage, match_of_times, rates_of
@@ -48,20 +48,20 @@ _FAINTEST, _BAND, _BANDS = 0.01, 0.2, 0.4
 class SynchronizationDisplay(Display):
     """Features over time before and after synchronisation, and the offsets (Figs. 1 and 3).
 
-    Below the features are the offsets: how much later or earlier than the others a performance is.
-    They are counted from the mean offset of all performances, so this mean is a line at 0. Use
+    Below the features are the offsets: how much later or earlier than the others a trial is.
+    They are counted from the mean offset of all trials, so this mean is a line at 0. Use
     `from_estimator` or `from_predictions`.
 
     Parameters
     ----------
     before : list of ndarray (n_frames_i, n_shown)
-        The features of the performances at their own frames; NaN in gaps.
+        The features of the trials at their own frames; NaN in gaps.
     after : ndarray, shape (n_sequences, P, n_shown)
         The features on the clock of the pattern.
     match : Match
-        The warps, their intervals, and which performances are doubtful.
+        The warps, their intervals, and which trials are doubtful.
     axis : TimeAxis
-        The times of the frames of performances and pattern, and the key-frames.
+        The times of the frames of trials and pattern, and the key-frames.
     ylabels : list of str
         The labels of the features.
     pattern : ndarray, shape (P, n_shown)
@@ -69,7 +69,7 @@ class SynchronizationDisplay(Display):
     titles : (str, str)
         The titles of the panels before and after.
     groups : list of str, default=None
-        The group of each performance, which determines its colour.
+        The group of each trial, which determines its colour.
     coverage : float or None, default=0.9
         Probability of the intervals around the offsets, as of `from_estimator`.
 
@@ -78,7 +78,7 @@ class SynchronizationDisplay(Display):
     axes_ : list of Axes
         For each feature the panels before and after, then that of the offsets.
     before_, after_ : list of LineCollection
-        The performances, one collection a feature.
+        The trials, one collection a feature.
     pattern_ : list of Line2D
         The pattern, one line a feature.
     group_means_ : list of list of Line2D
@@ -86,11 +86,11 @@ class SynchronizationDisplay(Display):
     offsets_ : LineCollection or None
         The offsets.
     intervals_ : PolyCollection or None
-        The bands around them, one a performance; None without intervals or offsets.
+        The bands around them, one a trial; None without intervals or offsets.
     keyframes_ : list of list of Line2D
         The key-frames, for each panel on the clock; empty without any.
     own_keyframes_ : list of LineCollection
-        Those of the performances, one collection a feature; empty without any.
+        Those of the trials, one collection a feature; empty without any.
 
     Examples
     --------
@@ -117,14 +117,14 @@ class SynchronizationDisplay(Display):
     coverage: float | None = 0.9
 
     def __repr__(self):
-        count = counted(len(self.before), "performance")
+        count = counted(len(self.before), "trial")
         return f"SynchronizationDisplay({count}, {list(self.ylabels)})"
 
     @classmethod
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: TrialsLike,
         *,
         features: Features | None = None,
         groups: Labels | None = None,
@@ -138,23 +138,23 @@ class SynchronizationDisplay(Display):
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
-        """Draw performances before and after synchronisation.
+        """Draw trials before and after synchronisation.
 
         Parameters
         ----------
         estimator : synchronizer, or Pipeline with one
             Fitted.
-        X : performances
+        X : trials
             As the estimator takes them.
         features : int, str or list of them, default=None
             Features by index or name, as they reach the synchronizer, such as dimensions of the
             aSpace. By default the first four. What scalers before the synchronizer do is undone.
         groups : sequence of length n_sequences, default=None
-            The group of each performance, such as ``bunch.actor``. Groups have different colours,
+            The group of each trial, such as ``bunch.actor``. Groups have different colours,
             and their means are drawn; all are on the clock of the same pattern.
         unit : {"frames", "percent", "seconds"}, default="frames"
-            The unit of time: frames; per cent of a performance, and of the pattern; or seconds of
-            the performances as recorded, and of the median performance on the clock.
+            The unit of time: frames; per cent of a trial, and of the pattern; or seconds of
+            the trials as recorded, and of the median trial on the clock.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X, for seconds; by default what tables tell, as in
             `Match.to_frame`. Key-frames are then in seconds, as for ``match``.
@@ -167,14 +167,14 @@ class SynchronizationDisplay(Display):
             Whether to draw the offsets, in a panel of their own.
         coverage : float or None, default=0.9
             Probability of the intervals of `Match.interval`, which are bands around the offsets.
-            Performances that are `Match.doubtful` are dotted in all panels. None: neither is
+            Trials that are `Match.doubtful` are dotted in all panels. None: neither is
             drawn. Nor is it if the match does not tell: only those of a `DenseSynchronizer` or
             `PartSynchronizer` do.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
             Further arguments of the ``match`` of the synchronizer, such as ``keyframes``, in
-            frames: lines on the clock, and ticks of each performance. The columns of a table of
+            frames: lines on the clock, and ticks of each trial. The columns of a table of
             key-frames are their names.
 
         Returns
@@ -186,12 +186,12 @@ class SynchronizationDisplay(Display):
             check_coverage(coverage)
         params = with_frame_rate(params, frame_rate)
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
-        before, synchronizer, performances = reached[:3]
-        width = performances[0].shape[1]
+        before, synchronizer, trials = reached[:3]
+        width = trials[0].shape[1]
         names = names_of_features(before, synchronizer, width)
         chosen = choose_features(features, names)
         undo, known_units = undo_scaling(before, X, width)
-        match, shown = reached.match(), [undo(x)[:, chosen] for x in performances]
+        match, shown = reached.match(), [undo(x)[:, chosen] for x in trials]
         axis = TimeAxis(
             unit,
             match.times.shape[1],
@@ -199,9 +199,9 @@ class SynchronizationDisplay(Display):
             rates_of(X, frame_rate, unit),
             xlabel,
             keyframes=named_keyframes(synchronizer, params.get("keyframes")),
-            trial_keyframes=keyframes_of_trials(synchronizer, performances, params),
+            trial_keyframes=keyframes_of_trials(synchronizer, trials, params),
         )
-        index = index_of_pattern(synchronizer, performances)
+        index = index_of_pattern(synchronizer, trials)
         return cls(
             shown,
             match.warp(shown),
@@ -209,7 +209,7 @@ class SynchronizationDisplay(Display):
             axis,
             labels_of_signals([names[i] for i in chosen], known_units, ylabel, units),
             undo(synchronizer.pattern_)[:, chosen],
-            ("as recorded", "the template" if index is None else f"the template, trial {index}"),
+            ("as recorded", "the pattern" if index is None else f"the pattern, trial {index}"),
             None if groups is None else names_of_groups(groups, len(shown)),
             coverage,
         ).plot(ax, warps=warps)
@@ -217,7 +217,7 @@ class SynchronizationDisplay(Display):
     @classmethod
     def from_predictions(
         cls,
-        X: PerformancesLike,
+        X: TrialsLike,
         match: Match | NumbersLike,
         *,
         features: Features | None = None,
@@ -231,18 +231,18 @@ class SynchronizationDisplay(Display):
         coverage: float | None = 0.9,
         ax: AxesLike | None = None,
     ) -> Self:
-        """Draw performances and warps that are known already.
+        """Draw trials and warps that are known already.
 
         Parameters
         ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
-            Performances, with NaN in gaps. Their mean on the clock takes the place of the pattern.
+        X : list of arrays (n_frames_i, n_features), 3-D array, or (trial, frame) frame
+            Trials, with NaN in gaps. Their mean on the clock takes the place of the pattern.
         match : Match, or array-like of shape (n_sequences, P)
             Such as ``synchronizer.match(X)``; or the warps tau(p) from 0 to P - 1 alone.
         features : int, str or list of them, default=None
             Features by index or name; by default the first four.
         groups : sequence of length n_sequences, default=None
-            The group of each performance, which determines its colour.
+            The group of each trial, which determines its colour.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
@@ -268,7 +268,7 @@ class SynchronizationDisplay(Display):
         Raises
         ------
         ValueError
-            If the match is of another number of performances, there is no such feature, labels or
+            If the match is of another number of trials, there is no such feature, labels or
             units do not fit, or a value is infinite.
         """
         if coverage is not None:
@@ -277,7 +277,7 @@ class SynchronizationDisplay(Display):
         if not isinstance(match, Match):
             match = match_of_times(match, len(arrays))
         for i, x in enumerate(arrays):
-            check_finite(x, f"Performance {i}, frame", allow_nan=True)
+            check_finite(x, f"Trial {i}, frame", allow_nan=True)
         names = names or [f"x{i}" for i in range(arrays[0].shape[1])]
         chosen = choose_features(features, names)
         shown = [x[:, chosen] for x in arrays]
@@ -321,7 +321,7 @@ class SynchronizationDisplay(Display):
 
     @property
     def doubtful(self) -> np.ndarray | None:
-        """Which performances are doubtful; None if the match does not tell, or without coverage."""
+        """Which trials are doubtful; None if the match does not tell, or without coverage."""
         tells = self.coverage is not None and self.match.intervals is not None
         return self.match.doubtful if tells else None
 
@@ -337,7 +337,7 @@ class SynchronizationDisplay(Display):
 
     def _draw(self):
         styles = {} if self.groups is None else group_styles(self.groups)
-        colors = [styles[group][0] for group in self.groups or ()] or COLORS["performance"]
+        colors = [styles[group][0] for group in self.groups or ()] or COLORS["trial"]
         clock, times, n_rows = self.axis.clock, self.axis.trials(), len(self.ylabels)
         self.before_, self.after_, self.pattern_, self.group_means_ = empty_lists(4)
         lefts, rights = self.axes_[: 2 * n_rows : 2], self.axes_[1 : 2 * n_rows : 2]
@@ -368,7 +368,7 @@ class SynchronizationDisplay(Display):
             legend_above(self.axes_, self.group_means_[0], list(styles), below=self.axes_[:2])
 
     def _draw_trials(self, axis, xs, ys, colors):
-        """Draw a curve of each performance; those of doubtful ones are dotted."""
+        """Draw a curve of each trial; those of doubtful ones are dotted."""
         linestyles, linewidths, alpha = "-", 0.9, 0.35 if self.groups else 0.55
         if self._n_doubtful():
             colors = colors if self.groups else [colors] * len(self.before)
@@ -380,7 +380,7 @@ class SynchronizationDisplay(Display):
         )
 
     def _draw_means(self, axis, clock, row, styles):
-        """Draw the mean of each group in front of its performances."""
+        """Draw the mean of each group in front of its trials."""
         means = []
         for name, (color, line) in styles.items():
             members = np.array(self.groups) == name
@@ -424,7 +424,7 @@ class SynchronizationDisplay(Display):
         xs = np.concatenate([clock, clock[::-1]])
         ys = np.concatenate([lower, upper[:, ::-1]], axis=1)
         faces = np.tile(to_rgba_array(colors), (1 if self.groups else n_sequences, 1))
-        # Those of doubtful performances are wide, few, and stay visible.
+        # Those of doubtful trials are wide, few, and stay visible.
         faces[:, 3] = _opacity(n_sequences - n_doubtful)
         if n_doubtful:
             faces[self.doubtful, 3] = _opacity(n_doubtful)
@@ -436,7 +436,7 @@ class SynchronizationDisplay(Display):
         return 0 if self.doubtful is None else int(np.count_nonzero(self.doubtful))
 
     def _describe_doubtful(self, before):
-        """How many performances are doubtful, after other words; nothing if none is."""
+        """How many trials are doubtful, after other words; nothing if none is."""
         count = self._n_doubtful()
         return f"{before}{counted(count, 'doubtful trial')}" if count else ""
 

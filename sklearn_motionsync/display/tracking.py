@@ -1,4 +1,4 @@
-"""TrackingDisplay: the estimated postures of a tracked body, and what was observed of it."""
+"""TrackingDisplay: the estimated poses of a tracked body, and what was observed of it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.types import Features, PerformanceLike, ValuesLike
+from ..inputs.types import Features, TrialLike, ValuesLike
 from ..inputs.wording import counted
 from ..matching.counting import runs_of
 from ..online.members import Track
@@ -27,9 +27,9 @@ from .arguments import (
     times_from_zero,
 )
 from .base import COLORS, WIDTH, AxesLike, Display, empty_lists, legend_above
-from .bodies import invert_postures
+from .bodies import invert_poses
 from .limb_departures import bones_of_limbs, limb_of
-from .stick_figures import SkeletonDisplay, postures_at
+from .stick_figures import SkeletonDisplay, poses_at
 
 __all__ = ["TrackingDisplay"]
 
@@ -102,8 +102,8 @@ class TrackingDisplay(Display):
     """
 
     track: Track
-    truth: PerformanceLike | None = None
-    observed: PerformanceLike | None = None
+    truth: TrialLike | None = None
+    observed: TrialLike | None = None
     times: ValuesLike | None = None
     n_frames: int | None = None
     names: Sequence[str] | None = None
@@ -112,7 +112,7 @@ class TrackingDisplay(Display):
     xlabel: str | None = None
 
     def __post_init__(self):
-        shape = np.shape(self.track.postures)
+        shape = np.shape(self.track.poses)
         self.truth, self.observed = (
             None if x is None else np.asarray(x, dtype=np.float64)
             for x in (self.truth, self.observed)
@@ -134,9 +134,9 @@ class TrackingDisplay(Display):
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformanceLike,
+        X: TrialLike,
         *,
-        truth: PerformanceLike | None = None,
+        truth: TrialLike | None = None,
         times: ValuesLike | None = None,
         features: Features | None = None,
         names: Sequence[str] | None = None,
@@ -192,7 +192,7 @@ class TrackingDisplay(Display):
                 "of several takes give one."
             )
         (track,) = estimator.track([X], None if times is None else [times])
-        n_frames, n_features = track.postures.shape
+        n_frames, n_features = track.poses.shape
         if truth is not None and np.shape(truth) != (n_frames, n_features):
             raise ValueError(
                 f"The truth must have the shape {(n_frames, n_features)}, got {np.shape(truth)}."
@@ -237,7 +237,7 @@ class TrackingDisplay(Display):
         ValueError
             If ``track`` is not the track of one take.
         """
-        if not isinstance(track, Track) or np.ndim(track.postures) != 2:
+        if not isinstance(track, Track) or np.ndim(track.poses) != 2:
             got = "that of one frame" if isinstance(track, Track) else type(track).__name__
             raise ValueError(
                 f"track must be the Track of one take, as from MotionTracker.track; got {got}. Of "
@@ -249,7 +249,7 @@ class TrackingDisplay(Display):
         """The features that are drawn, by index."""
         if self.features is not None:
             return choose_features(self.features, self.names)
-        variance = np.var(self.track.postures, axis=0)
+        variance = np.var(self.track.poses, axis=0)
         hidden = self.hidden.any(axis=0)
         candidates = np.flatnonzero(hidden if hidden.any() else ~hidden)
         return candidates[np.argsort(-variance[candidates], kind="stable")][:_N_FEATURES]
@@ -332,7 +332,7 @@ class TrackingDisplay(Display):
         if not isinstance(cosines, DirectionCosines):
             raise ValueError(f"cosines must be DirectionCosines, got {type(cosines).__name__}.")
         skeleton = cosines.skeleton.body()
-        estimate = invert_postures(self.track.postures, cosines, skeleton)
+        estimate = invert_poses(self.track.poses, cosines, skeleton)
         shown = as_frames(frames, len(estimate))
         limbs = np.array([limb_of(name) for name in cosines.get_feature_names_out()])
         marked = [bones_of_limbs(limbs[self.hidden[frame]], skeleton) for frame in shown]
@@ -341,17 +341,17 @@ class TrackingDisplay(Display):
             titles = [f"{time:.1f} s" for time in np.asarray(self.times)[shown]]
         behind = None
         if self.truth is not None:
-            behind = postures_at(shown, [invert_postures(self.truth, cosines, skeleton)])
-        scenes = postures_at(shown, [estimate])
+            behind = poses_at(shown, [invert_poses(self.truth, cosines, skeleton)])
+        scenes = poses_at(shown, [estimate])
         return SkeletonDisplay(scenes, skeleton, titles, marked=marked, behind=behind).plot(
             ax, azimuth=azimuth
         )
 
     def _draw_feature(self, axis, k):
-        estimate = self.track.postures[:, k]
+        estimate = self.track.poses[:, k]
         half_width = _BAND * np.sqrt(np.maximum(self.track.covariances[:, k, k], 0))
         low, high = estimate - half_width, estimate + half_width
-        blue, orange, black = (COLORS[key] for key in ("performance", "mean", "pattern"))
+        blue, orange, black = (COLORS[key] for key in ("trial", "mean", "pattern"))
         times = self.times
         band = axis.fill_between(
             times, low, high, color=blue, alpha=0.25, linewidth=0, label="90 %"
@@ -370,7 +370,7 @@ class TrackingDisplay(Display):
         if self.n_frames is not None:
             phases = 100 * phases / (self.n_frames - 1)
             upper.set_ylim(-3, 103)
-        blue = COLORS["performance"]
+        blue = COLORS["trial"]
         (self.phase_,) = upper.plot(self.times, phases, color=blue)
         lower.axhline(1, color=COLORS["envelope"], linewidth=1, linestyle="--")
         (self.rate_,) = lower.plot(self.times, self.track.rates, color=blue)

@@ -9,7 +9,7 @@ import numpy as np
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch
 
-from ..inputs.types import PerformancesLike
+from ..inputs.types import TrialsLike
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .base import COLORS, WIDTH, AxesLike, Display, front_line, legend_above
@@ -19,7 +19,7 @@ __all__ = ["TrellisDisplay"]
 
 @dataclass(eq=False, repr=False)
 class TrellisDisplay(Display):
-    """The disparity space of one pair of performances, and the path through it (Fig. 2).
+    """The disparity space of one pair of trials, and the path through it (Fig. 2).
 
     Use `from_estimator`.
 
@@ -30,7 +30,7 @@ class TrellisDisplay(Display):
     warp : ndarray, shape (P,)
         The final offsets Delta(p), after consensus, smoothing and refinement.
     names : (str, str)
-        Names of the pattern and of the performance.
+        Names of the pattern and of the trial.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class TrellisDisplay(Display):
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, random_state=0)
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-    >>> display = TrellisDisplay.from_estimator(DenseSynchronizer(50).fit(X), X, performance=2)
+    >>> display = TrellisDisplay.from_estimator(DenseSynchronizer(50).fit(X), X, trial=2)
     >>> display.space.costs.shape
     (50, 41)
     """
@@ -66,22 +66,22 @@ class TrellisDisplay(Display):
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: PerformancesLike,
+        X: TrialsLike,
         *,
-        performance: int = 0,
+        trial: int = 0,
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
-        """Draw the disparity space of the pattern and one performance.
+        """Draw the disparity space of the pattern and one trial.
 
         Parameters
         ----------
         estimator : DenseSynchronizer, or Pipeline with one
             Fitted.
-        X : performances
+        X : trials
             As the estimator takes them.
-        performance : int, default=0
-            The index of the performance that is matched to the pattern.
+        trial : int, default=0
+            The index of the trial that is matched to the pattern.
         ax : Axes, default=None
             See `plot`.
         **params : dict
@@ -94,14 +94,14 @@ class TrellisDisplay(Display):
         """
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
-        synchronizer, performances = reached.synchronizer, reached.performances
-        space = synchronizer.disparity_space(performances, performance, **reached.params)
+        synchronizer, trials = reached.synchronizer, reached.trials
+        space = synchronizer.disparity_space(trials, trial, **reached.params)
         if reached.params:
-            warp = reached.match().offsets[performance]
+            warp = reached.match().offsets[trial]
         else:
-            warp = synchronizer.match(performances.take([performance])).offsets[0]
-        index = index_of_pattern(synchronizer, performances)
-        names = ("template" if index is None else f"template {index}", f"trial {performance}")
+            warp = synchronizer.match(trials.take([trial])).offsets[0]
+        index = index_of_pattern(synchronizer, trials)
+        names = ("pattern" if index is None else f"pattern {index}", f"trial {trial}")
         return cls(space, warp, names).plot(ax)
 
     def _layout(self):

@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 
 from ..body.skeleton import Skeleton
 from ..inputs.numbers import nanmean
-from ..inputs.types import PerformancesLike, ValuesLike
+from ..inputs.types import TrialsLike, ValuesLike
 from ..matching.counting import first_largest, parabola_vertex, whole
 from .recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings, Walk, horizontal, pieces
 
@@ -61,7 +61,7 @@ _RUNNING, _OTHER_STRIKE = 0.04, 0.35
 
 
 def gait_events(
-    X: PerformancesLike,
+    X: TrialsLike,
     skeleton: Skeleton | None = None,
     *,
     feet: Mapping[str, str | Sequence[str] | None] | None = None,
@@ -86,7 +86,7 @@ def gait_events(
     Returns
     -------
     DataFrame
-        One row an event, by recording and time: the label of the recording (``performance``, or
+        One row an event, by recording and time: the label of the recording (``trial``, or
         the levels of the labels of X); ``label``, "Foot Strike" or "Foot Off"; ``context``, "Left"
         or "Right"; ``frame``, from 0, with fractions, as the index of the recording counts; and
         ``time`` in seconds.

@@ -10,7 +10,7 @@ import pandas as pd
 
 from ..body.formats import SIDES
 from ..body.skeleton import Skeleton
-from ..inputs.types import PerformancesLike, Table, ValuesLike
+from ..inputs.types import Table, TrialsLike, ValuesLike
 from .events import events_of
 from .recordings import FOOT_OFF, FOOT_STRIKE, Recordings, horizontal
 
@@ -28,7 +28,7 @@ _LONGEST = 1.5
 
 
 def gait_parameters(
-    X: PerformancesLike,
+    X: TrialsLike,
     skeleton: Skeleton | None = None,
     *,
     events: Table | None = None,

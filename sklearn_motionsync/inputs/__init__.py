@@ -1,1 +1,1 @@
-"""The input contract: what a set of performances is, and how estimators take one."""
+"""The input contract: what a set of trials is, and how estimators take one."""

@@ -1,16 +1,16 @@
-"""The input contract: what a set of performances is.
+"""The input contract: what a set of trials is.
 
-A set of performances is a list of 2-D arrays ``(n_frames_i, n_features)``. A 3-D array, a 1-D
-object array, a list of DataFrames (of pandas or polars) and a DataFrame indexed by performance, in
+A set of trials is a list of 2-D arrays ``(n_frames_i, n_features)``. A 3-D array, a 1-D
+object array, a list of DataFrames (of pandas or polars) and a DataFrame indexed by trial, in
 one level or more, and frame are the same thing; so are a table with a series in each cell, and a
-DataArray of xarray (`tables`). A 2-D array is read by rows: postures for the posture-level
+DataArray of xarray (`tables`). A 2-D array is read by rows: poses for the pose-level
 estimators, univariate sequences for the sequence-level ones.
 
-Any other sequence that gives performances by index, ``len(X)`` and ``X[i]``, such as one that opens
+Any other sequence that gives trials by index, ``len(X)`` and ``X[i]``, such as one that opens
 a file for each, or a 3-D data set on disk, is a list of them, too: each is read once, one after the
 other. Synchronizers read it, and memory maps, in parts when they transform and match, and only what
 they need for a fit to a sample (``max_fit``); other estimators read it into memory. The first
-performance that is read in parts sets the precision of all: after single precision, double
+trial that is read in parts sets the precision of all: after single precision, double
 precision is refused.
 """
 
@@ -44,7 +44,7 @@ from .tables import (
     check_dimensions,
     is_nested,
     labels_of,
-    name_performance,
+    name_trial,
     split_nested,
     split_table,
 )
@@ -53,7 +53,7 @@ from .wording import counted, within
 __all__ = [
     "ACCEPTED",
     "NOT_ONE",
-    "Performances",
+    "Trials",
     "as_collection",
     "as_source",
     "check_members",
@@ -63,14 +63,14 @@ __all__ = [
 ]
 
 ACCEPTED = (
-    "A set of performances is a list of 2-D arrays (n_frames, n_features), a 3-D array "
-    "(n_sequences, n_frames, n_features) or a DataFrame indexed by (performance, frame)"
+    "A set of trials is a list of 2-D arrays (n_frames, n_features), a 3-D array "
+    "(n_sequences, n_frames, n_features) or a DataFrame indexed by (trial, frame)"
 )
-NOT_ONE = f"{ACCEPTED}; got a single 2-D input. Wrap one performance as [X]."
+NOT_ONE = f"{ACCEPTED}; got a single 2-D input. Wrap one trial as [X]."
 
 
-class Performances(tuple):
-    """Checked performances: arrays of one dtype, and what it takes to give the same kind back.
+class Trials(tuple):
+    """Checked trials: arrays of one dtype, and what it takes to give the same kind back.
 
     The arrays are views of the input where its dtype allows: never write to them.
 
@@ -79,11 +79,11 @@ class Performances(tuple):
     kind : {"rows", "array", "list", "frame"}
         2-D, 3-D, list, MultiIndex frame.
     labels : list
-        Of the performances; tuples where several levels name them.
+        Of the trials; tuples where several levels name them.
     frames : list
-        Labels of the frames of each performance of a table; empty where they are numbered.
+        Labels of the frames of each trial of a table; empty where they are numbered.
     names : sequence of str or None
-        Names of the features; after `check_performances` ``feature_names_in_`` of the estimator.
+        Names of the features; after `check_trials` ``feature_names_in_`` of the estimator.
     levels : tuple of str
         Names of the levels of an index; the last is that of the frames.
     numbers : sequence of int
@@ -115,11 +115,11 @@ class Performances(tuple):
 
     def called(self, i):
         """The name of one of them in messages."""
-        return name_performance(self.numbers[i], self.labels[i])
+        return name_trial(self.numbers[i], self.labels[i])
 
     def replace(self, arrays):
-        """Other arrays of the same performances."""
-        out = Performances(
+        """Other arrays of the same trials."""
+        out = Trials(
             arrays, self.kind, self.labels, self.frames, self.names, self.levels, self.numbers
         )
         out.facts = self.facts
@@ -134,7 +134,7 @@ class Performances(tuple):
             [values[i] for i in indices] if values else ()
             for values in (self, self.labels, self.numbers, self.frames)
         )
-        return Performances(arrays, kind, labels, frames, self.names, self.levels, numbers)
+        return Trials(arrays, kind, labels, frames, self.names, self.levels, numbers)
 
 
 def check_members(
@@ -148,7 +148,7 @@ def check_members(
     timed=False,
     advice=None,
 ):
-    """Check the performances of a collection in one pass.
+    """Check the trials of a collection in one pass.
 
     Parameters
     ----------
@@ -171,11 +171,11 @@ def check_members(
 
     Returns
     -------
-    Performances
+    Trials
         Of the kind "list", with the names of the columns (None without names).
     """
     if len(sequences) == 0:
-        raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {ACCEPTED}.")
+        raise ValueError(f"Found 0 trials (n_samples=0), at least 1 is needed. {ACCEPTED}.")
     numbers = range(len(sequences)) if numbers is None else numbers
     labels, levels, frames, fitted = list(numbers), INDEX_NAMES, [], names
     tables = any([issubclass(kind, pd.DataFrame) for kind in set(map(type, sequences))])
@@ -185,7 +185,7 @@ def check_members(
         if first is not None and len(set(first)) < len(first):
             name, count = Counter(first).most_common(1)[0]
             raise ValueError(
-                f"{name_performance(numbers[0], labels[0])} has {count} columns of the name "
+                f"{name_trial(numbers[0], labels[0])} has {count} columns of the name "
                 f"{name!r}: rename them, as in x.set_axis(names, axis=1)."
             )
         names = first if fitted is None or first is None else fitted
@@ -194,7 +194,7 @@ def check_members(
     arrays, largest, holder = [], 0.0, 0
 
     def what(i):
-        return name_performance(numbers[i], labels[i])
+        return name_trial(numbers[i], labels[i])
 
     for i, x in enumerate(sequences):
         columns = column_names(x) if tables else None
@@ -206,7 +206,7 @@ def check_members(
         if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] < 1:
             raise ValueError(
                 f"{what(i)} has shape {array.shape}, expected (n_frames, n_features) with at least "
-                "2 frames and 1 feature. Give a univariate performance as a column, "
+                "2 frames and 1 feature. Give a univariate trial as a column, "
                 "x[:, np.newaxis]; if all are (n_features, n_frames), give [x.T for x in X]."
             )
         if columns != names and fitted is not None and names is fitted:
@@ -217,8 +217,8 @@ def check_members(
         if array.shape[1] != arrays[0].shape[1]:
             turned = all(len(other) == len(arrays[0]) < min(other.shape[1:]) for other in arrays)
             raise ValueError(
-                f"{what(i)} has {counted(array.shape[1], 'feature')} a frame, performance "
-                f"{numbers[0]} has {arrays[0].shape[1]}. All performances need the same features "
+                f"{what(i)} has {counted(array.shape[1], 'feature')} a frame, trial "
+                f"{numbers[0]} has {arrays[0].shape[1]}. All trials need the same features "
                 "in the same order."
                 + (" If they are (n_features, n_frames), give [x.T for x in X]." if turned else "")
             )
@@ -245,12 +245,12 @@ def check_members(
         dtype = np.float32 if {a.dtype for a in arrays} == {np.dtype(np.float32)} else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.
     arrays = [np.ascontiguousarray(a, dtype=dtype) for a in arrays]
-    performances = Performances(arrays, "list", labels, frames, names, levels, numbers)
+    trials = Trials(arrays, "list", labels, frames, names, levels, numbers)
     if tables:
-        performances.facts = [facts_of(x) for x in sequences]
+        trials.facts = [facts_of(x) for x in sequences]
         if not timed:
             warn_of_rows(sequences, what)
-    return performances
+    return trials
 
 
 def _are_same(columns, names):
@@ -261,7 +261,7 @@ def _are_same(columns, names):
 
 
 def _refuse_columns(columns, names, what, first):
-    """Say which columns a performance lacks, and which it has besides, by the first one."""
+    """Say which columns a trial lacks, and which it has besides, by the first one."""
     raise ValueError(
         f"{what} has the columns {listed(columns)}, and {first} has {listed(names)}"
         f"{difference(columns, names)}. All need the same columns: select them by x[names]; of "
@@ -273,7 +273,7 @@ def _refuse_columns(columns, names, what, first):
 
 
 def as_collection(X):
-    """The performances of a collection as a list; None for what scikit-learn calls 2-D."""
+    """The trials of a collection as a list; None for what scikit-learn calls 2-D."""
     _refuse_containers(X)
     X = as_pandas(X)
     if isinstance(X, pd.DataFrame):
@@ -301,15 +301,15 @@ def as_collection(X):
 
 # Containers of other packages, by package and class, and the way from them to a list.
 _CONTAINERS = {
-    ("xarray", "Dataset"): "sklearn_motionsync.io.from_poses(X) gives the performances of one; of "
+    ("xarray", "Dataset"): "sklearn_motionsync.io.from_poses(X) gives the trials of one; of "
     "several, [x for poses in X for x in from_poses(poses)]. Of variables that are features, "
-    "to_sequences(X.to_dataframe(dim_order=[..., 'time'])).",
+    "to_trials(X.to_dataframe(dim_order=[..., 'time'])).",
     ("skfda", "FDataGrid"): "Give list(X.data_matrix).",
 }
 
 
 def _refuse_containers(X):
-    """Refuse what other packages keep performances in, alone or in a list."""
+    """Refuse what other packages keep trials in, alone or in a list."""
     items = X if isinstance(X, (list, tuple)) else [X]
     for kind in set(map(type, items)):
         way = _CONTAINERS.get((kind.__module__.partition(".")[0], kind.__name__))
@@ -318,20 +318,20 @@ def _refuse_containers(X):
 
 
 def _members(X):
-    """The performances of a list; None for the rows of a matrix."""
+    """The trials of a list; None for the rows of a matrix."""
     if set(map(type, X)) == {np.ndarray} and max([x.ndim for x in X]) >= 2:
         return list(X)
     items = [as_table(x) for x in X]
     for i, item in enumerate(items):
         if not _depth(item) and not isinstance(item, (Number, str, bytes, PathLike, np.generic)):
-            raise ValueError(f"Performance {i} is of type {type(item).__name__}. {ACCEPTED}.")
+            raise ValueError(f"Trial {i} is of type {type(item).__name__}. {ACCEPTED}.")
     depths = [_depth(item) for item in items]
     if not items or max(depths) >= 2:
         return items
     if len({len(item) for item, depth in zip(items, depths, strict=True) if depth == 1}) > 1:
         raise ValueError(
-            f"{ACCEPTED}. Performance 0 has {counted(len(items[0]), 'value')} in one dimension and "
-            "others have other lengths: give univariate performances as columns, x[:, np.newaxis]."
+            f"{ACCEPTED}. Trial 0 has {counted(len(items[0]), 'value')} in one dimension and "
+            "others have other lengths: give univariate trials as columns, x[:, np.newaxis]."
         )
     return None
 
@@ -385,7 +385,7 @@ def _has_items(X):
 
 
 class _Source:
-    """A sequence that gives performances by index, of which the first has been read."""
+    """A sequence that gives trials by index, of which the first has been read."""
 
     def __init__(self, collection, first):
         self._collection, self._first = collection, first
@@ -401,12 +401,12 @@ class _Source:
 
 
 def count_of(X):
-    """The number of performances, or of rows."""
+    """The number of trials, or of rows."""
     return X.shape[0] if hasattr(X, "shape") else len(X)
 
 
 def select(X, indices):
-    """Some performances, or rows, by their indices; nothing else is read."""
+    """Some trials, or rows, by their indices; nothing else is read."""
     if isinstance(X, np.ndarray):
         return X[indices]
     if isinstance(X, pd.DataFrame):

@@ -1,4 +1,4 @@
-"""What is known of performances beside their numbers: frame rate, unit and vertical axis.
+"""What is known of trials beside their numbers: frame rate, unit and vertical axis.
 
 Tables say so: their ``attrs``, as `io.read_motion` fills them, and an index in seconds. Arrays say
 nothing, and are taken as they are.
@@ -31,7 +31,7 @@ _UNITS |= {"meter": "m", "metre": "m", "degree": "deg", "°": "deg", "radian": "
 _WORDS = {
     "frame_rate": (
         "{:g} frames a second",
-        "Durations and speeds are compared in frames. Resample: to_sequences(x, frame_rate={:g}).",
+        "Durations and speeds are compared in frames. Resample: to_trials(x, frame_rate={:g}).",
     ),
     "units": ("the unit {!r:.60}", "Convert the numbers, and set x.attrs['units'] = {!r:.60}."),
     "up": ("the vertical axis {!r}", "Turn the positions, and set x.attrs['up'] = {!r}."),
@@ -39,7 +39,7 @@ _WORDS = {
 
 
 def facts_of(x):
-    """The known facts of a performance: a dict, which is empty for an array."""
+    """The known facts of a trial: a dict, which is empty for an array."""
     if not isinstance(x, pd.DataFrame):
         return {}
     up = x.attrs.get("up")
@@ -57,7 +57,7 @@ def facts_in_fit(estimator):
 
 
 def check_facts(estimator, facts, called, *, reset, which=None):
-    """Hold the facts of performances against each other, and against those of the training set.
+    """Hold the facts of trials against each other, and against those of the training set.
 
     Parameters
     ----------
@@ -86,18 +86,18 @@ def check_facts(estimator, facts, called, *, reset, which=None):
 
 
 def compare_facts(facts, called, which=None, reference=None, sources=None):
-    """The different values of the facts of performances, which must agree but for the frame rate.
+    """The different values of the facts of trials, which must agree but for the frame rate.
 
     Parameters
     ----------
     facts : list of dict
-        Of each performance, from `facts_of`.
+        Of each trial, from `facts_of`.
     called : callable
-        Gives the name of a performance by its index.
+        Gives the name of a trial by its index.
     which : sequence of str, default=None
         The facts to compare; by default all.
     reference : dict of str to tuple, default=None
-        Values known before; the first performance that says something is the reference of others.
+        Values known before; the first trial that says something is the reference of others.
     sources : dict of str to str, default=None
         Where these are from, for messages.
 
@@ -135,7 +135,7 @@ def compare_facts(facts, called, which=None, reference=None, sources=None):
 
 
 def _report(fact, different, called, source, reference):
-    """Say that performances differ: a warning of rates, an error of all else."""
+    """Say that trials differ: a warning of rates, an error of all else."""
     words, remedy = _WORDS[fact]
     first, n_more = next(iter(different)), len(different) - 1
     more = f" {n_more} more differ." if n_more else ""
@@ -153,7 +153,7 @@ def _equal(a, b):
 
 
 def units_of_columns(x):
-    """The known units of the columns of a performance: a dict by their names."""
+    """The known units of the columns of a trial: a dict by their names."""
     if not isinstance(x, pd.DataFrame):
         return {}
     units, names = _spelled_units(x), x.attrs.get("channels")

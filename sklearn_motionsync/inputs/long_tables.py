@@ -1,4 +1,4 @@
-"""Tables of frames to performances, in order of an even time, and back."""
+"""Tables of frames to trials, in order of an even time, and back."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .resampling import (
 from .tables import (
     FRAME,
     INDEX_NAMES,
-    PERFORMANCE,
     ROW,
     SPLIT,
+    TRIAL,
     as_pandas,
     full_names,
     is_labelled_array,
@@ -36,10 +36,10 @@ from .tables import (
     split_table,
     stack_frame,
 )
-from .types import Labels, PerformancesLike, Table
+from .types import Labels, Table, TrialsLike
 from .wording import counted
 
-__all__ = ["to_frame", "to_sequences"]
+__all__ = ["to_frame", "to_trials"]
 
 # What to do with times that are no frames.
 _EVENTS = (
@@ -48,7 +48,7 @@ _EVENTS = (
 )
 
 
-def to_sequences(
+def to_trials(
     df: Table,
     by: str | Sequence[str] | None = None,
     time: str | None = None,
@@ -56,7 +56,7 @@ def to_sequences(
     frame_rate: float | None = None,
     max_gap_time: float | None = None,
 ) -> list[pd.DataFrame]:
-    """Turn a table of frames into a list of performances.
+    """Turn a table of frames into a list of trials.
 
     Do this *before* cross-validation: scikit-learn would split the table by row. Estimators warn of
     rows split at random. Every second row passes: it is a lower frame rate.
@@ -65,21 +65,21 @@ def to_sequences(
     ----------
     df : DataFrame of pandas or polars, or DataArray of xarray
         One row a frame. Without ``by`` and ``time`` its index has two levels or more: the last is
-        the frame, increasing within each performance, and those before it name the performance.
-        Times there that are not even are warned of. A table with a row a performance and a series
-        in each cell, and an array with the dimensions of performances, ``time`` and features, are
+        the frame, increasing within each trial, and those before it name the trial.
+        Times there that are not even are warned of. A table with a row a trial and a series
+        in each cell, and an array with the dimensions of trials, ``time`` and features, are
         made into such a table.
     by : str or list of str, default=None
-        Columns or index levels that together tell performances apart; rows of one performance
+        Columns or index levels that together tell trials apart; rows of one trial
         need not be neighbours. By default the levels of the index before the last; a table
-        without such an index is one performance if there is a ``time``.
+        without such an index is one trial if there is a ``time``.
     time : str, default=None
         The column or index level that tells the time of frames: numbers, dates, which become
         seconds from the first of them, or durations, which become seconds. It puts the frames in
         order. By default rows are frames in the order they come in.
     frame_rate : float, default=None
-        Frames in a unit of ``time`` that performances shall have. By default each keeps its own.
-        Without ``time`` they are frames a second, and each performance has a known frame rate: in
+        Frames in a unit of ``time`` that trials shall have. By default each keeps its own.
+        Without ``time`` they are frames a second, and each trial has a known frame rate: in
         its ``attrs``, as from `io.read_motion`, or by an index in seconds, as the result has.
     max_gap_time : float, default=None
         Longest step of ``time``, in its unit, that is bridged by a straight line. By default
@@ -88,9 +88,9 @@ def to_sequences(
     Returns
     -------
     list of DataFrame
-        One ``(n_frames_i, n_features)`` frame a performance, in order of first appearance, indexed
+        One ``(n_frames_i, n_features)`` frame a trial, in order of first appearance, indexed
         by the frame level, the time, or 0, 1, ... What ``by`` and ``time`` name are no features.
-        ``attrs["performance"]`` is the label, a tuple if several levels name the performance,
+        ``attrs["trial"]`` is the label, a tuple if several levels name the trial,
         ``attrs["levels"]`` the names of the levels. With a ``time``, ``attrs["resampled"]`` is
         whether frames were interpolated, and ``attrs["clock"]`` the time of the first frame and the
         step to the next. A table without ``by`` keeps the label that it has. What `io.read_motion`
@@ -99,8 +99,8 @@ def to_sequences(
     Raises
     ------
     ValueError
-        If there is no such column or level, a key or a time is missing, a time of a performance
-        comes twice, or there is a gap; without ``time``, if the frames of a performance do not
+        If there is no such column or level, a key or a time is missing, a time of a trial
+        comes twice, or there is a gap; without ``time``, if the frames of a trial do not
         increase.
 
     See Also
@@ -109,7 +109,7 @@ def to_sequences(
 
     Notes
     -----
-    A performance whose times are even, but for rounding, is left as it is. Any other is
+    A trial whose times are even, but for rounding, is left as it is. Any other is
     *resampled*: every feature is interpolated linearly on an even grid from its first to its last
     time, whose step is as near as possible to the median of its steps, or at ``frame_rate`` from
     its first time on. A gap in a feature (NaN) stays one.
@@ -117,15 +117,15 @@ def to_sequences(
     Examples
     --------
     >>> import pandas as pd
-    >>> from sklearn_motionsync import to_frame, to_sequences
+    >>> from sklearn_motionsync import to_frame, to_trials
     >>> df = pd.DataFrame({
     ...     "subject": ["ann"] * 5, "trial": [1, 1, 2, 2, 2], "time": [0.1, 0, 0, 0.1, 0.25],
     ...     "knee": [3, 1, 4, 5, 8],
     ... })
-    >>> performances = to_sequences(df, by=["subject", "trial"], time="time")
-    >>> [x.attrs["performance"] for x in performances]
+    >>> trials = to_trials(df, by=["subject", "trial"], time="time")
+    >>> [x.attrs["trial"] for x in trials]
     [('ann', 1), ('ann', 2)]
-    >>> to_frame(performances)["knee"]
+    >>> to_frame(trials)["knee"]
     subject  trial  time
     ann      1      0.000    1.0
                     0.100    3.0
@@ -143,29 +143,29 @@ def to_sequences(
     if time is None and max_gap_time is not None:
         raise ValueError(f"max_gap_time={max_gap_time!r} needs time=, the column of the times.")
     if time is None and frame_rate is not None:
-        sequences = [df] if by is None and df.index.nlevels < 2 else to_sequences(df, by)
+        sequences = [df] if by is None and df.index.nlevels < 2 else to_trials(df, by)
         return [_at_rate(x, frame_rate) for x in sequences]
     if by is None and time is None:
         sequences = split_table(df)
-        warn_of_rows(sequences, lambda i: f"Performance {sequences[i].attrs['performance']!r}")
+        warn_of_rows(sequences, lambda i: f"Trial {sequences[i].attrs['trial']!r}")
         return sequences
     return _split_by_columns(df, by, time, frame_rate, max_gap_time)
 
 
 def to_frame(
-    sequences: PerformancesLike,
+    sequences: TrialsLike,
     *,
-    performances: Labels | None = None,
+    trials: Labels | None = None,
     columns: Sequence[Hashable] | pd.Index | None = None,
 ) -> pd.DataFrame:
-    """Turn performances into one frame that is indexed by performance and frame.
+    """Turn trials into one frame that is indexed by trial and frame.
 
     Parameters
     ----------
     sequences : list of 2-D arrays or DataFrames, or 3-D array
-        Performances ``(n_frames_i, n_features)``.
-    performances : sequence of length n_sequences, default=None
-        Labels; an index of one level or several; or the DataFrames of `to_sequences`. The last two
+        Trials ``(n_frames_i, n_features)``.
+    trials : sequence of length n_sequences, default=None
+        Labels; an index of one level or several; or the DataFrames of `to_trials`. The last two
         give the names of the levels, too. By default those that the sequences have from
         there, or 0, 1, ...
     columns : sequence of str, default=None
@@ -174,19 +174,19 @@ def to_frame(
     Returns
     -------
     DataFrame
-        The concatenated performances. The index levels are ``performance`` and ``frame``, or what
+        The concatenated trials. The index levels are ``trial`` and ``frame``, or what
         they are called in the table that labels and frames come from. Its ``attrs`` have the frame
-        rate, unit and vertical axis that all performances share.
+        rate, unit and vertical axis that all trials share.
 
     Raises
     ------
     ValueError
-        If the performances do not agree in width, names, units or vertical axes, or a label is
+        If the trials do not agree in width, names, units or vertical axes, or a label is
         missing or given twice.
 
     See Also
     --------
-    to_sequences : The way back.
+    to_trials : The way back.
 
     Examples
     --------
@@ -198,7 +198,7 @@ def to_frame(
     >>> df.loc[1, "knee"].tolist()
     [1.0, 1.0, 1.0]
     >>> labels = pd.MultiIndex.from_tuples([("ann", 1), ("ann", 2)], names=["subject", "trial"])
-    >>> to_frame(X, performances=labels, columns=["knee"]).loc["ann"].loc[2].shape
+    >>> to_frame(X, trials=labels, columns=["knee"]).loc["ann"].loc[2].shape
     (3, 1)
     """
     sequences = as_collection(sequences)
@@ -206,17 +206,17 @@ def to_frame(
         raise ValueError(NOT_ONE)
     arrays = check_members(sequences, finite=False)
     labels, levels, names = arrays.labels, arrays.levels, arrays.names
-    if performances is not None:
-        labels, outer = labels_given(performances)
+    if trials is not None:
+        labels, outer = labels_given(trials)
         levels = (*outer, levels[-1])
     if len(labels) != len(arrays) or len(set(labels)) != len(labels):
         raise ValueError(
-            f"performances must be {counted(len(arrays), 'different label')}, one a performance, "
+            f"trials must be {counted(len(arrays), 'different label')}, one a trial, "
             f"got {len(labels)} of which {len(set(labels))} differ."
         )
     for i, label in enumerate(labels):
         if any(pd.isna(item) is True for item in (label if isinstance(label, tuple) else [label])):
-            raise ValueError(f"Performance {i} has no label: performances[{i}] is {label!r}.")
+            raise ValueError(f"Trial {i} has no label: trials[{i}] is {label!r}.")
     columns = names if columns is None else list(columns)
     if columns is not None and len(columns) != arrays[0].shape[1]:
         raise ValueError(
@@ -235,7 +235,7 @@ def to_frame(
     return table
 
 
-# -- steps of to_sequences ------------------------------------------------------------------
+# -- steps of to_trials ------------------------------------------------------------------
 
 
 def _as_table(df):
@@ -245,22 +245,22 @@ def _as_table(df):
         df = to_frame([df] if df.ndim == 2 else df)
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
-            f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Several "
+            f"to_trials needs a DataFrame of pandas or polars, got {type(df).__name__}. Several "
             f"tables make one: pd.concat(tables, names={list(INDEX_NAMES)}); arrays that are "
-            "performances already need no table."
+            "trials already need no table."
         )
     return to_frame(df) if is_nested(df) else df
 
 
 def _split_by_columns(df, by, time, frame_rate, max_gap_time):
-    """The performances of a table of which columns or levels name performance or time."""
+    """The trials of a table of which columns or levels name trial or time."""
     if df.index.nlevels > 1:
         df = df.rename_axis(index=full_names(df.index.names))
     keys, times = _keys(df, by, time), [] if time is None else [time]
     flat = _levels_as_columns(df, keys, times)
     features = flat.drop(columns=[*keys, *times])
     refuse_non_numeric(features, "The table")
-    names = keys or [PERFORMANCE]
+    names = keys or [TRIAL]
     if len(keys) > 1:
         index = pd.MultiIndex.from_frame(flat[keys])
     else:
@@ -268,9 +268,9 @@ def _split_by_columns(df, by, time, frame_rate, max_gap_time):
     labels, rows_by_label = rows_of_labels(index, names)
     if keys and len(flat) == len(labels):
         raise ValueError(
-            f"{keys} give {counted(len(flat), 'performance')} of one row each, and a performance "
+            f"{keys} give {counted(len(flat), 'trial')} of one row each, and a trial "
             "has 2 frames or more, one below the other. Name in by= the columns of the "
-            "performance only, and the time in time=: to_sequences(df, by=..., time=...)."
+            "trial only, and the time in time=: to_trials(df, by=..., time=...)."
         )
     if not keys and own_label(df)[0] is not None:
         label, names = own_label(df)
@@ -297,7 +297,7 @@ def _split_by_columns(df, by, time, frame_rate, max_gap_time):
     _check_gaps([times for times, _ in timed], labels, max_gap_time)
     sequences = []
     for (times, rows), label in zip(timed, labels, strict=True):
-        grid = even_grid(times, frame_rate, f"Performance {label!r}")
+        grid = even_grid(times, frame_rate, f"Trial {label!r}")
         x = _rows(features, rows, pd.Index(times, name=time))
         if grid is not None:
             columns = {k: interpolate(x.iloc[:, k], times, grid) for k in range(x.shape[1])}
@@ -310,7 +310,7 @@ def _split_by_columns(df, by, time, frame_rate, max_gap_time):
 
 
 def _at_rate(x, frame_rate):
-    """A performance of a known frame rate at another one."""
+    """A trial of a known frame rate at another one."""
     rate = frame_rate_of_rows(x)
     if rate is None:
         raise ValueError(
@@ -320,11 +320,11 @@ def _at_rate(x, frame_rate):
         )
     time = next(name for name in ("time", "time_s", "seconds") if name not in x.columns)
     timed = x.assign(**{time: np.arange(len(x)) / rate})
-    return to_sequences(timed, time=time, frame_rate=frame_rate)[0]
+    return to_trials(timed, time=time, frame_rate=frame_rate)[0]
 
 
 def _keys(df, by, time):
-    """The columns or levels that name the performance."""
+    """The columns or levels that name the trial."""
     if by is not None:
         return list(by) if isinstance(by, (list, tuple, pd.Index, np.ndarray)) else [by]
     levels = list(df.index.names)
@@ -357,13 +357,13 @@ def _levels_as_columns(df, keys, times):
             f"are {columns[:20]}."
         )
     if not len(flat):
-        raise ValueError("The table has no rows, so there are no performances in it.")
+        raise ValueError("The table has no rows, so there are no trials in it.")
     return flat
 
 
 def _in_order(column, rows, label, name):
-    """Times of a performance, increasing, and its rows in this order."""
-    called = f"The time of performance {label!r}"
+    """Times of a trial, increasing, and its rows in this order."""
+    called = f"The time of trial {label!r}"
     if isinstance(column, np.ndarray):
         times = column[rows]
     else:
@@ -379,8 +379,8 @@ def _in_order(column, rows, label, name):
     twice = times[:-1][np.diff(times) == 0]
     if len(twice):
         raise ValueError(
-            f"Times of performance {label!r} come twice, {len(twice)} of them, the first is "
-            f"{twice[0]:.10g}. Name in by= all columns that tell performances apart, or drop the "
+            f"Times of trial {label!r} come twice, {len(twice)} of them, the first is "
+            f"{twice[0]:.10g}. Name in by= all columns that tell trials apart, or drop the "
             f"doubles by df.drop_duplicates. {_EVENTS}"
         )
     return times, rows[order]
@@ -396,10 +396,10 @@ def _check_gaps(timed, labels, max_gap_time):
     if gaps:
         start, end, step, label = max(gaps, key=lambda gap: gap[1] - gap[0])
         raise ValueError(
-            f"Performance {label!r} has a gap from {start:.10g} to {end:.10g}, where frames are "
-            f"{step:.4g} apart, the longest of {len(gaps)} in all performances. Frames count as "
+            f"Trial {label!r} has a gap from {start:.10g} to {end:.10g}, where frames are "
+            f"{step:.4g} apart, the longest of {len(gaps)} in all trials. Frames count as "
             "evenly spaced: bridge gaps by straight lines with max_gap_time="
-            f"{end - start:.7g}, or leave such performances out. {_EVENTS}"
+            f"{end - start:.7g}, or leave such trials out. {_EVENTS}"
         )
 
 

@@ -28,7 +28,7 @@ __all__ = [
 
 # The precisions that are kept.
 FLOATS = np.dtype(np.float64), np.dtype(np.float32)
-# Limits of the largest magnitude of a set of performances. In any unit of motion capture data lie
+# Limits of the largest magnitude of a set of trials. In any unit of motion capture data lie
 # far within; squares and fourth powers of such numbers neither overflow nor vanish.
 SMALLEST, LARGEST = 1e-9, 1e9
 
@@ -36,7 +36,7 @@ _TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
 _TEXT = (
     "Give numbers: pd.read_csv(path, decimal=',') reads decimal commas, "
-    "to_sequences(df, by=..., time=...) takes columns that name the performance or the time, and "
+    "to_trials(df, by=..., time=...) takes columns that name the trial or the time, and "
     "pd.to_numeric(column, errors='coerce') makes other text NaN"
 )
 _UNITS = (
@@ -44,7 +44,7 @@ _UNITS = (
 )
 _LABEL = (
     "It looks like a label, such as the trial's name: name it in by=, or drop it. "
-    "to_sequences(df, by=..., time=...) takes it"
+    "to_trials(df, by=..., time=...) takes it"
 )
 _ADVICE = "Interpolate the gap, as by sklearn_motionsync.io.fill_gaps(x, max_gap=10)"
 # The name of a file, by its ending, which begins with a letter.
@@ -216,13 +216,13 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False, advi
     ----------
     array : ndarray, shape (n_frames, n_features)
     where : str
-        Up to the number of the frame, such as "Performance 3, frame".
+        Up to the number of the frame, such as "Trial 3, frame".
     names, frames : list, default=None
         Names of the features, and labels of the frames.
     allow_nan : bool, default=False
         Refuse infinity only.
     advice : str, default=None
-        What to do about NaN, instead of dropping the performance; by default to fill the gap.
+        What to do about NaN, instead of dropping the trial; by default to fill the gap.
     """
     # A sum is not finite if a term is not; no mask is made of a sound array.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -238,19 +238,19 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False, advi
     advice = "Give NaN where nothing is known" if allow_nan else advice or _ADVICE
     raise ValueError(
         f"{where} {frame}{label}, feature {feature}{name} is {kind}; the input must be finite. "
-        f"{advice}, or drop the performance. (Input X contains NaN or infinity.)"
+        f"{advice}, or drop the trial. (Input X contains NaN or infinity.)"
     )
 
 
 def check_magnitude(largest, what, *, training):
-    """Refuse performances in a unit in which no movement is measured.
+    """Refuse trials in a unit in which no movement is measured.
 
     Parameters
     ----------
     largest : float
         The largest absolute value of all of them.
     what : str
-        The performance that holds it, such as "Performance 3".
+        The trial that holds it, such as "Trial 3".
     training : bool
         Whether they are a whole training set: a smaller set may hold tiny values only.
     """

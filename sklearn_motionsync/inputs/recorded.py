@@ -43,8 +43,8 @@ _LONGEST_STEP = 1
 SAME_RATE = 0.01
 # A share of a step by which rounding may move a time.
 _ROUNDING = 0.4
-# Key-frames are seconds if all of a performance are below 1, or in this share of it. Of 585 moments
-# of people none is: the first lies at frame 8.3, or at 0.032 of its performance.
+# Key-frames are seconds if all of a trial are below 1, or in this share of it. Of 585 moments
+# of people none is: the first lies at frame 8.3, or at 0.032 of its trial.
 _IN_SECONDS = 1 / 50
 # In fewer frames than these a key-frame may be below 1.
 _FEW_FRAMES = 10
@@ -59,7 +59,7 @@ def recorded_frames(df):
     Parameters
     ----------
     df : DataFrame
-        One performance. Frames are counted as in its ``attrs["events"]``: from 0, the first row
+        One trial. Frames are counted as in its ``attrs["events"]``: from 0, the first row
         of the table that ``attrs`` describe.
 
     Returns
@@ -89,12 +89,12 @@ def recorded_frames(df):
 
 
 def frames_of_rows(x):
-    """The frames of the rows of a performance, which increase; without an index of frames, from 0.
+    """The frames of the rows of a trial, which increase; without an index of frames, from 0.
 
     Parameters
     ----------
     x : DataFrame, or array of frames
-        One performance.
+        One trial.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def frame_rate_of_rows(x):
     Parameters
     ----------
     x : DataFrame, or anything
-        One performance.
+        One trial.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def start_of_rows(x):
     Parameters
     ----------
     x : DataFrame, or anything
-        One performance.
+        One trial.
 
     Returns
     -------
@@ -159,7 +159,7 @@ def names_seconds(name):
 
 
 def refuse_seconds(frames, n_frames, name):
-    """Refuse key-frames of a performance, fractions among them, that can only be seconds."""
+    """Refuse key-frames of a trial, fractions among them, that can only be seconds."""
     last = max(frames, default=0)
     is_early = n_frames >= _FEW_FRAMES and last < max(1, _IN_SECONDS * (n_frames - 1))
     if is_early and (frames != np.round(frames)).any():
@@ -172,7 +172,7 @@ def refuse_seconds(frames, n_frames, name):
 def refuse_moved_events(X):
     """Refuse tables, in a list or in one, whose rows are not the frames that their events count.
 
-    Key-frames count the rows of a performance; those of its events would be of other rows.
+    Key-frames count the rows of a trial; those of its events would be of other rows.
     """
     if isinstance(X, pd.DataFrame) and X.index.nlevels > 1:
         X = split_table(X)
@@ -183,9 +183,9 @@ def refuse_moved_events(X):
         if frames is not None and (frames != np.arange(len(frames))).any():
             row = int((frames != np.arange(len(frames))).argmax())
             raise ValueError(
-                f"Performance {i}: by its index row {row} is frame {frames[row]} of the recording. "
-                "Events in attrs count its frames, and key-frames the rows of the performance. "
-                "Cut performances by cut_at_events, which moves events; if the key-frames count "
+                f"Trial {i}: by its index row {row} is frame {frames[row]} of the recording. "
+                "Events in attrs count its frames, and key-frames the rows of the trial. "
+                "Cut trials by cut_at_events, which moves events; if the key-frames count "
                 "rows, give df.reset_index(drop=True)."
             )
 
@@ -202,7 +202,7 @@ def warn_of_rows(sequences, called):
     ----------
     sequences : list of DataFrame and of others, which pass
     called : callable
-        Gives the name of a performance by its index.
+        Gives the name of a trial by its index.
     """
     for i, x in enumerate(sequences):
         trouble = _trouble_of_rows(x) if isinstance(x, pd.DataFrame) else None
@@ -239,8 +239,8 @@ def _trouble_of_rows(x):
             f"rows look split, as by cross-validation of rows, which puts every trial into train "
             f"and test: {len(times)} are left of {round(np.ptp(times) / steps.min()) + 1} between "
             f"{times[0]:.10g} and {times[-1]:.10g}, level {name!r} of the index. Give "
-            "to_sequences(table), a list, which is split by trial. Rows left out on purpose are "
-            f"filled in by to_sequences(df, time={name!r}, max_gap_time=...)."
+            "to_trials(table), a list, which is split by trial. Rows left out on purpose are "
+            f"filled in by to_trials(df, time={name!r}, max_gap_time=...)."
         )
     if is_uneven and timed:
         worst = steps.argmax()
@@ -248,7 +248,7 @@ def _trouble_of_rows(x):
             f"the times of its rows, level {name!r} of the index, are not even: from "
             f"{times[worst]:.10g} to {times[worst + 1]:.10g} it is {steps[worst]:.4g}, mostly "
             f"{np.median(steps):.4g}. Frames count as evenly spaced: "
-            f"to_sequences(df, time={name!r}) makes them so."
+            f"to_trials(df, time={name!r}) makes them so."
         )
     has_two_rates = index_rate is not None and is_rate(rate) and recorded_frames(x) is None
     if has_two_rates and not is_thinned(index_rate, rate):
@@ -305,12 +305,12 @@ class Recorded:
         self._rate = frame_rate_of_rows(df)
 
     def attrs_of(self, rows, times=None, grid=None):
-        """The ``attrs`` of some rows, clock and events moved to the frames of a performance.
+        """The ``attrs`` of some rows, clock and events moved to the frames of a trial.
 
         Parameters
         ----------
         rows : ndarray of int
-            Which rows of the table are in the performance, in its order.
+            Which rows of the table are in the trial, in its order.
         times : ndarray, default=None
             Of these rows, in any unit.
         grid : ndarray, default=None
@@ -349,7 +349,7 @@ class Recorded:
         return facts
 
     def _rate_of(self, rate, frames, times, grid):
-        """The frame rate of a performance, from that of the recording."""
+        """The frame rate of a trial, from that of the recording."""
         if grid is not None:
             pace = np.median(np.diff(times)) / (grid[1] - grid[0])
             return rounded_rate(rate / self.step * pace)
@@ -372,7 +372,7 @@ def _frame_of(event):
 
 
 def _move_event(event, frames, times, grid):
-    """An event at its frame in the performance."""
+    """An event at its frame in the trial."""
     frame, places = _frame_of(event), np.arange(len(frames))
     if frame is None:
         return event

@@ -77,7 +77,7 @@ def find_time_gaps(times, max_gap_time=None):
 
 
 def even_grid(times, frame_rate, what):
-    """The even times that replace those of a performance; None if they are even themselves.
+    """The even times that replace those of a trial; None if they are even themselves.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def even_grid(times, frame_rate, what):
         Frames in a unit of time; by default as near to the median step as it takes to keep the
         first and the last frame.
     what : str
-        The name of the performance in messages.
+        The name of the trial in messages.
     """
     if len(times) < 2:
         return None
@@ -169,16 +169,16 @@ def is_even(times):
 
 
 def as_frame_rates(frame_rate, n_sequences=None):
-    """Frames a second: one number, or a column of one number for each performance.
+    """Frames a second: one number, or a column of one number for each trial.
 
-    Without a number of performances any count is right.
+    Without a number of trials any count is right.
     """
     rate = as_numbers(frame_rate, "frame_rate", dtype=np.float64)
     valid = (rate > 0) & np.isfinite(rate) & (np.asarray(frame_rate).dtype.kind != "b")
     fits = rate.ndim < 2 if n_sequences is None else rate.shape in ((), (n_sequences,))
     if not fits or not valid.all():
-        which = f": performance {int(np.argmin(valid))}" if rate.ndim and not valid.all() else ""
-        each = "performances" if n_sequences is None else counted(n_sequences, "performance")
+        which = f": trial {int(np.argmin(valid))}" if rate.ndim and not valid.all() else ""
+        each = "trials" if n_sequences is None else counted(n_sequences, "trial")
         raise ValueError(
             "frame_rate must be one number above 0, in frames a second, or one for each of the "
             f"{each}, got {reprlib.repr(frame_rate)}{which}."

@@ -1,10 +1,10 @@
-"""Tables of frames are split into performances that carry their labels, and put together again.
+"""Tables of frames are split into trials that carry their labels, and put together again.
 
 The index of a table has two or more levels: the last is the frame, those before it together name
-the performance. Every performance that is split off carries its label and the names of the levels
+the trial. Every trial that is split off carries its label and the names of the levels
 in ``attrs``, so that lists keep them, however they are sliced.
 
-Other packages have nested tables, with a row a performance and a column a feature, whose cells are
+Other packages have nested tables, with a row a trial and a column a feature, whose cells are
 series, as sktime; and labelled arrays, whose dimensions have names and labels, as xarray.
 """
 
@@ -30,7 +30,7 @@ __all__ = [
     "labelled",
     "labels_given",
     "labels_of",
-    "name_performance",
+    "name_trial",
     "own_label",
     "rows_of_labels",
     "split_nested",
@@ -39,24 +39,21 @@ __all__ = [
 ]
 
 # Names of the levels of an index; the last is that of the frames.
-INDEX_NAMES = PERFORMANCE, FRAME = "performance", "frame"
-# The level of the frames where "frame" names performances.
+INDEX_NAMES = TRIAL, FRAME = "trial", "frame"
+# The level of the frames where "frame" names trials.
 ROW = "row"
 # Keys of ``attrs``.
-_LABEL, _LEVELS = "performance", "levels"
+_LABEL, _LEVELS = "trial", "levels"
 # Names of levels of frames.
 _TIMES = ("frame", "time")
-# What to do with a table that does not tell its performances apart.
-SPLIT = (
-    "Name the columns or levels of the performance and of the time: "
-    "to_sequences(df, by=..., time=...)."
-)
+# What to do with a table that does not tell its trials apart.
+SPLIT = "Name the columns or levels of the trial and of the time: to_trials(df, by=..., time=...)."
 
 
 def split_table(df):
-    """The performances of a table whose index names performance and frame."""
+    """The trials of a table whose index names trial and frame."""
     if df.index.nlevels < 2:
-        raise ValueError(f"An index of 1 level(s) does not name performance and frame. {SPLIT}")
+        raise ValueError(f"An index of 1 level(s) does not name trial and frame. {SPLIT}")
     keys, frames = df.index.droplevel(-1), df.index.get_level_values(-1)
     levels = full_names(df.index.names)
     if levels[0] in _TIMES and levels[-1] not in (*_TIMES, ROW):
@@ -70,7 +67,7 @@ def split_table(df):
         index = frames[rows]
         if not index.is_monotonic_increasing or not index.is_unique:
             raise ValueError(
-                f"The frames of performance {label!r} do not increase. Drop the frames that come "
+                f"The frames of trial {label!r} do not increase. Drop the frames that come "
                 f"twice and sort the table by df.sort_index(), or by its time: {SPLIT}"
             )
         sequences.append(labelled(df.iloc[rows].set_axis(index), label, levels, df.attrs))
@@ -85,7 +82,7 @@ def rows_of_labels(keys, names):
             raise ValueError(
                 f"{name!r} is missing (NaN) in {len(missing)} of {counted(len(keys), 'row')}, the "
                 f"first is row {missing[0]}. Drop these rows or fill them in: every row needs the "
-                "name of its performance."
+                "name of its trial."
             )
     codes, labels = pd.factorize(keys)
     order = np.argsort(codes, kind="stable")
@@ -118,18 +115,18 @@ def as_pandas(table):
     return pd.DataFrame({name: table[name].to_numpy() for name in table.columns})
 
 
-# -- labels of performances -----------------------------------------------------------
+# -- labels of trials -----------------------------------------------------------
 
 
-def name_performance(i, label):
-    """The name of a performance in messages and figures."""
+def name_trial(i, label):
+    """The name of a trial in messages and figures."""
     name = repr(label) if isinstance(label, tuple) else "" if label == i else f"({label!r})"
     name = name if len(name) <= 60 else f"{name[:56]} ..."
-    return f"Performance {i} {name}".rstrip()
+    return f"Trial {i} {name}".rstrip()
 
 
 def labels_of(sequences, numbers=None):
-    """Labels of performances, and the names of the levels of an index of them.
+    """Labels of trials, and the names of the levels of an index of them.
 
     Those that a list carries, if it does so throughout and they differ; otherwise their numbers,
     0, 1, ... by default.
@@ -141,7 +138,7 @@ def labels_of(sequences, numbers=None):
     names = {levels for _, levels in carried}
     if len(names) == 1 and None not in names and len(set(labels)) == len(labels):
         return labels, (*names.pop(), frame)
-    return list(range(len(sequences)) if numbers is None else numbers), (PERFORMANCE, frame)
+    return list(range(len(sequences)) if numbers is None else numbers), (TRIAL, frame)
 
 
 def own_label(x):
@@ -178,21 +175,21 @@ def label_of_part(whole, part, level, levels=()):
     return {_LABEL: (*before, part), _LEVELS: (*names, last, FRAME)}
 
 
-def labels_given(performances):
-    """Labels, and the names of their levels, from labels or from performances that carry them.
+def labels_given(trials):
+    """Labels, and the names of their levels, from labels or from trials that carry them.
 
     Parameters
     ----------
-    performances : list of labels, Index, or list of DataFrame
+    trials : list of labels, Index, or list of DataFrame
     """
-    if isinstance(performances, pd.Index):
-        names = [*performances.names, None]
-        return [_plain(label) for label in performances], full_names(names)[:-1]
-    labels = list(performances)
+    if isinstance(trials, pd.Index):
+        names = [*trials.names, None]
+        return [_plain(label) for label in trials], full_names(names)[:-1]
+    labels = list(trials)
     if labels and all(isinstance(x, pd.DataFrame) for x in labels):
         labels, levels = labels_of(labels)
         return labels, levels[:-1]
-    return labels, (PERFORMANCE,)
+    return labels, (TRIAL,)
 
 
 def index_of(labels, names):
@@ -203,7 +200,7 @@ def index_of(labels, names):
 
 
 def stack_frame(arrays, labels, frames, columns, levels=INDEX_NAMES):
-    """Arrays below each other under an index of performance, of one level or more, and frame.
+    """Arrays below each other under an index of trial, of one level or more, and frame.
 
     Without ``frames`` they are numbered.
     """
@@ -221,14 +218,14 @@ def stack_frame(arrays, labels, frames, columns, levels=INDEX_NAMES):
 
 
 def labelled(x, label, levels, attrs):
-    """A performance with its label and the names of its levels in ``attrs``, beside other facts."""
+    """A trial with its label and the names of its levels in ``attrs``, beside other facts."""
     x.attrs = {**attrs, _LABEL: label, _LEVELS: tuple(levels)}
     return x
 
 
 def full_names(names):
     """Names for the levels that have none."""
-    default = [PERFORMANCE] if len(names) == 2 else [f"level_{k}" for k in range(len(names) - 1)]
+    default = [TRIAL] if len(names) == 2 else [f"level_{k}" for k in range(len(names) - 1)]
     default.append(FRAME)
     return tuple(d if name is None else name for name, d in zip(names, default, strict=True))
 
@@ -244,7 +241,7 @@ def is_nested(df):
 
 
 def split_nested(df):
-    """The performances of a nested table.
+    """The trials of a nested table.
 
     Raises
     ------
@@ -259,12 +256,12 @@ def split_nested(df):
         for name, cell, index in zip(df.columns, row, frames, strict=True):
             if np.ndim(cell) != 1:
                 raise ValueError(
-                    f"Column {name!r} of performance {label!r} holds {cell!r:.60}, and others "
+                    f"Column {name!r} of trial {label!r} holds {cell!r:.60}, and others "
                     f"hold a series: leave it out, as in df.drop(columns=[{name!r}])."
                 )
             if len(cell) != len(first) or (isinstance(index, pd.Index) and not index.equals(first)):
                 raise ValueError(
-                    f"Column {name!r} of performance {label!r} has {len(cell)} frames, which are "
+                    f"Column {name!r} of trial {label!r} has {len(cell)} frames, which are "
                     f"not the {len(first)} frames of column {df.columns[0]!r}: resample them to "
                     "the same frames."
                 )
@@ -282,7 +279,7 @@ def is_labelled_array(x):
 
 
 def as_table(x):
-    """One performance of polars or xarray as a table of pandas; anything else as it is.
+    """One trial of polars or xarray as a table of pandas; anything else as it is.
 
     The frames of an array lie along its dimension "time" or "frame", else along the first. Its
     coordinates name rows and columns, and those of a single value are its label.
@@ -312,6 +309,6 @@ def check_dimensions(x):
     if is_labelled_array(x) and x.dims[0] in _TIMES:
         time, second, third = x.dims
         raise ValueError(
-            f"The dimensions of the DataArray are {x.dims}, and the first tells performances "
+            f"The dimensions of the DataArray are {x.dims}, and the first tells trials "
             f"apart: give X.transpose({second!r}, {time!r}, {third!r})."
         )

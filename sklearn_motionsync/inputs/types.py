@@ -1,7 +1,7 @@
 """Types of arguments that several public signatures share, for mypy, pyright and editors.
 
 They describe what is accepted as far as types can; ``_parameter_constraints`` and
-`check_performances` check it when the code runs.
+`check_trials` check it when the code runs.
 """
 
 from collections.abc import Hashable, Sequence
@@ -19,12 +19,12 @@ __all__ = [
     "NamesLike",
     "NumbersLike",
     "Path",
-    "PerformanceLike",
-    "PerformancesLike",
     "RandomState",
     "SupportsArray",
     "Table",
     "Transformed",
+    "TrialLike",
+    "TrialsLike",
     "Unit",
     "UpAxis",
     "ValuesLike",
@@ -47,14 +47,14 @@ class Indexed(Protocol[_Item]):
     def __getitem__(self, index: int, /) -> _Item: ...
 
 
-# One number a frame or performance; one performance; numbers of one or two axes. Not text.
+# One number a frame or trial; one trial; numbers of one or two axes. Not text.
 ValuesLike: TypeAlias = SupportsArray | Sequence[float]
-PerformanceLike: TypeAlias = SupportsArray | Sequence[Sequence[float]]
+TrialLike: TypeAlias = SupportsArray | Sequence[Sequence[float]]
 NumbersLike: TypeAlias = ValuesLike | Sequence[ValuesLike]
 NamesLike: TypeAlias = SupportsArray | Sequence[str]
-# A set of performances: a list of 2-D arrays or tables, a 3-D or object array, a table of all.
-PerformancesLike: TypeAlias = SupportsArray | Indexed[PerformanceLike] | Sequence[Sequence[float]]
-# One label a performance: ``groups``, ``y``, names of subjects.
+# A set of trials: a list of 2-D arrays or tables, a 3-D or object array, a table of all.
+TrialsLike: TypeAlias = SupportsArray | Indexed[TrialLike] | Sequence[Sequence[float]]
+# One label a trial: ``groups``, ``y``, names of subjects.
 Labels: TypeAlias = SupportsArray | Indexed[Hashable]
 # Some of the features, by index or name.
 Features: TypeAlias = int | str | Sequence[int] | Sequence[str] | np.ndarray
@@ -69,6 +69,6 @@ Transformed: TypeAlias = Any
 RandomState: TypeAlias = int | np.random.RandomState | None
 Path: TypeAlias = str | PathLike[str]
 
-Cost: TypeAlias = Literal["velocity", "elastic", "posture"]
+Cost: TypeAlias = Literal["velocity", "elastic", "pose"]
 Unit: TypeAlias = Literal["frames", "percent", "seconds"]
 UpAxis: TypeAlias = Literal["y", "x", "z", "-y", "-x", "-z"]

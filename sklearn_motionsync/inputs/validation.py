@@ -13,7 +13,7 @@ from sklearn.utils import get_tags
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .collections import ACCEPTED, NOT_ONE, Performances, as_collection, as_source, check_members
+from .collections import ACCEPTED, NOT_ONE, Trials, as_collection, as_source, check_members
 from .facts import check_facts, facts_of
 from .numbers import (
     FLOATS,
@@ -24,15 +24,15 @@ from .numbers import (
     column_names,
     refuse_non_numeric,
 )
-from .tables import FRAME, INDEX_NAMES, PERFORMANCE, SPLIT, as_pandas, labels_of, stack_frame
-from .types import PerformancesLike, Transformed
+from .tables import FRAME, INDEX_NAMES, SPLIT, TRIAL, as_pandas, labels_of, stack_frame
+from .types import Transformed, TrialsLike
 from .wording import counted
 
 __all__ = [
-    "PerformanceTransformerMixin",
     "SequenceLevelMixin",
-    "check_performances",
+    "TrialTransformerMixin",
     "check_transformed",
+    "check_trials",
     "labels_of_input",
     "labels_of_parts",
     "names_of_input",
@@ -46,14 +46,14 @@ __all__ = [
 _NAMES = "_names_in"
 # A straight line over so many frames is no accident.
 _CLOCK_FRAMES = 8
-# Above this ratio of `_smoothness` the second axis may be the time. Sets of real performances of 10
+# Above this ratio of `_smoothness` the second axis may be the time. Sets of real trials of 10
 # to 50 frames have 0.002 to 0.2, or 0.9 with features of unit variance; with their axes exchanged
 # they have 5.7 and more; noise has 1.
 _NO_TIME = 0.9
-# Below this one the first axis is the time. Six features of one performance have 0.0001 to 0.008,
-# one feature of many performances 0.3 and more.
+# Below this one the first axis is the time. Six features of one trial have 0.0001 to 0.008,
+# one feature of many trials 0.3 and more.
 _TIME = 0.05
-# So many performances tell.
+# So many trials tell.
 _ENOUGH = 100
 _EXCHANGED = (
     " If it is (n_features, n_frames), exchange the axes: give np.swapaxes(X, 1, 2), or "
@@ -62,19 +62,19 @@ _EXCHANGED = (
 
 
 class SequenceLevelMixin:
-    """Input checks of estimators whose samples are whole performances."""
+    """Input checks of estimators whose samples are whole trials."""
 
-    # How `check_performances` treats NaN; "allow-nan" admits gaps.
+    # How `check_trials` treats NaN; "allow-nan" admits gaps.
     _finite: bool | str = True
     n_features_in_: int
 
-    def check_performances(self, X: PerformancesLike) -> Performances:
-        """Check performances against the input contract, and against those of ``fit``.
+    def check_trials(self, X: TrialsLike) -> Trials:
+        """Check trials against the input contract, and against those of ``fit``.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            The rows of a 2-D array are univariate performances.
+            The rows of a 2-D array are univariate trials.
 
         Returns
         -------
@@ -89,11 +89,11 @@ class SequenceLevelMixin:
             names.
         """
         on_rows = self._read_rows_in_fit()
-        if isinstance(X, Performances) and (X.kind == "rows") is on_rows and len(X):
+        if isinstance(X, Trials) and (X.kind == "rows") is on_rows and len(X):
             same = X.names is getattr(self, "feature_names_in_", None)
             if same and X[0].shape[not on_rows] == self.n_features_in_:
                 return X
-        return check_performances(
+        return check_trials(
             self, X, reset=False, level="sequence", on_rows=on_rows, finite=self._finite
         )
 
@@ -107,27 +107,25 @@ class SequenceLevelMixin:
         return on_rows
 
     def _check_training_set(self, X, numbers=None):
-        """Check the input of ``fit``: all performances, or some with their numbers."""
-        performances = check_performances(
+        """Check the input of ``fit``: all trials, or some with their numbers."""
+        trials = check_trials(
             self, X, reset=True, level="sequence", numbers=numbers, finite=self._finite
         )
-        self._fitted_on_rows = performances.kind == "rows"
+        self._fitted_on_rows = trials.kind == "rows"
         if not self._fitted_on_rows:
-            warn_of_clocks(performances, names_of_input(self))
-        return performances
+            warn_of_clocks(trials, names_of_input(self))
+        return trials
 
 
-class PerformanceTransformerMixin(TransformerMixin):
-    """scikit-learn's mixin of transformers, for those whose samples are performances."""
+class TrialTransformerMixin(TransformerMixin):
+    """scikit-learn's mixin of transformers, for those whose samples are trials."""
 
-    def fit_transform(
-        self, X: PerformancesLike, y: object = None, **fit_params: Any
-    ) -> Transformed:
-        """Fit to performances, then transform them.
+    def fit_transform(self, X: TrialsLike, y: object = None, **fit_params: Any) -> Transformed:
+        """Fit to trials, then transform them.
 
         Parameters
         ----------
-        X : performances
+        X : trials
             As for ``fit``.
         y : array-like, default=None
             As for ``fit``.
@@ -142,7 +140,7 @@ class PerformanceTransformerMixin(TransformerMixin):
         return super().fit_transform(X, y, **fit_params)
 
 
-def check_performances(
+def check_trials(
     estimator,
     X,
     *,
@@ -165,7 +163,7 @@ def check_performances(
     X : the input, of any kind the contract names
     reset : bool
         True in ``fit``.
-    level : {"posture", "sequence"}
+    level : {"pose", "sequence"}
         How a 2-D input is read.
     on_rows : bool, default=None
         Whether the estimator was fitted on 2-D input and takes nothing else; None: it takes both.
@@ -180,7 +178,7 @@ def check_performances(
 
     Returns
     -------
-    Performances
+    Trials
     """
     sequences = as_collection(X)
     if sequences is None:
@@ -194,7 +192,7 @@ def check_performances(
     if on_rows:
         raise ValueError(
             f"{name} was fitted on a 2-D array of univariate sequences (n_sequences, "
-            f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
+            f"{estimator.n_features_in_}) and got a collection of trials. Give it 2-D "
             "input, or fit it on a collection."
         )
     out = check_members(
@@ -210,7 +208,7 @@ def check_performances(
     width = out[0].shape[1]
     if not reset and width != estimator.n_features_in_:
         raise ValueError(
-            f"Performance {out.numbers[0]} has {counted(width, 'feature')} a frame, but {name} is "
+            f"Trial {out.numbers[0]} has {counted(width, 'feature')} a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
             + (_EXCHANGED if {len(x) for x in out} == {estimator.n_features_in_} else "")
         )
@@ -240,7 +238,7 @@ def names_of_input(estimator):
 
 
 def check_transformed(estimator, X, names, *, finite=True):
-    """Check the input of ``inverse_transform``: postures of features of these names."""
+    """Check the input of ``inverse_transform``: poses of features of these names."""
     space = type(type(estimator).__name__, (BaseEstimator,), {})()
     space.n_features_in_ = len(names)
     sequences = as_collection(X)
@@ -248,32 +246,32 @@ def check_transformed(estimator, X, names, *, finite=True):
     named = column_names(first)
     if named is not None and isinstance(named[0], str):
         space.feature_names_in_ = np.asarray(names, dtype=object)
-    return check_performances(space, X, reset=False, level="posture", finite=finite)
+    return check_trials(space, X, reset=False, level="pose", finite=finite)
 
 
-def restore(estimator, performances, arrays, *, frames=None, columns=None):
+def restore(estimator, trials, arrays, *, frames=None, columns=None):
     """Give transformed arrays back as the kind of the input, or as a MultiIndex frame.
 
     ``frames`` replaces the frame labels of the input where its time was changed,
     ``columns`` the names of the estimator's outputs.
     """
-    if performances.kind == "rows":
+    if trials.kind == "rows":
         return arrays[0]
     container = _get_output_config("transform", estimator)["dense"]
     if container == "pandas":
-        labels_of_frames, levels = performances.frames, performances.levels
+        labels_of_frames, levels = trials.frames, trials.levels
         if frames is not None:
             labels_of_frames, levels = [frames] * len(arrays), (*levels[:-1], FRAME)
         columns = estimator.get_feature_names_out() if columns is None else columns
-        return stack_frame(arrays, performances.labels, labels_of_frames, columns, levels)
+        return stack_frame(arrays, trials.labels, labels_of_frames, columns, levels)
     if container != "default":
         raise ValueError(
             f"{type(estimator).__name__} has no {container!r} output for a collection of "
-            "performances, as such a table has no index to tell them apart. Use "
+            "trials, as such a table has no index to tell them apart. Use "
             "set_output(transform='pandas'), and pl.DataFrame(table.reset_index().to_dict('list')) "
             "on its result."
         )
-    if performances.kind == "array" or isinstance(arrays, np.ndarray):
+    if trials.kind == "array" or isinstance(arrays, np.ndarray):
         return np.stack(arrays) if isinstance(arrays, list) else arrays
     return arrays
 
@@ -283,11 +281,11 @@ def labels_of_input(X, reached):
 
     Parameters
     ----------
-    X : performances, the input of the first step of a pipeline
-    reached : Performances
+    X : trials, the input of the first step of a pipeline
+    reached : Trials
         The input of a later step, maybe without labels.
     """
-    is_read = isinstance(X, Performances) or as_source(X) is not None
+    is_read = isinstance(X, Trials) or as_source(X) is not None
     sequences = None if is_read else as_collection(X)
     if sequences is not None:
         labels, levels = labels_of(sequences)
@@ -299,9 +297,9 @@ def labels_of_input(X, reached):
 def read_collection(X):
     """Arrays and column names of a collection of any kind, which may have gaps.
 
-    For what comes along with performances; their estimators use ``check_performances``.
+    For what comes along with trials; their estimators use ``check_trials``.
     """
-    if isinstance(X, Performances):
+    if isinstance(X, Trials):
         return X, None
     sequences = as_collection(X)
     if sequences is None:
@@ -311,10 +309,10 @@ def read_collection(X):
 
 
 def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
-    """A 2-D input: rows are postures, or univariate sequences."""
+    """A 2-D input: rows are poses, or univariate sequences."""
     if on_rows is False:
         raise ValueError(
-            f"{type(estimator).__name__} was fitted on a collection of performances and got 2-D or "
+            f"{type(estimator).__name__} was fitted on a collection of trials and got 2-D or "
             f"other input: wrap one sequence as [X]. {ACCEPTED}."
         )
     if reset and level == "sequence" and isinstance(as_pandas(X), pd.DataFrame):
@@ -339,19 +337,19 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
     row = int(size.argmax())
     row_name = f"Row {row if numbers is None else numbers[row]}"
     check_magnitude(size[row], row_name, training=reset)
-    if level == "posture":
-        levels = PERFORMANCE, getattr(index, "name", None) or FRAME
-        return Performances([out], "rows", [0], levels=levels)
+    if level == "pose":
+        levels = TRIAL, getattr(index, "name", None) or FRAME
+        return Trials([out], "rows", [0], levels=levels)
     if out.shape[1] < 2:
         raise ValueError(
             "Each row of a 2-D input is one univariate sequence and needs at least 2 frames, got "
-            f"n_features = {out.shape[1]}. For performances of several features use a list."
+            f"n_features = {out.shape[1]}. For trials of several features use a list."
         )
     if reset:
         _warn_of_one_trial(out)
     rows = [row[:, np.newaxis] for row in out]
     labels = list(range(len(out)) if numbers is None else numbers)
-    return Performances(rows, "rows", labels, names=names, numbers=numbers)
+    return Trials(rows, "rows", labels, names=names, numbers=numbers)
 
 
 def _refuse_long_table(name, df):
@@ -365,21 +363,21 @@ def _refuse_long_table(name, df):
     if not numbered or timed:
         raise ValueError(
             f"{name} got a table of {counted(len(df), 'row')} with the columns "
-            f"{list(df.columns[:4])}, whose index does not tell performances apart. {SPLIT} If "
-            "every row is one univariate performance, give df.to_numpy(); if every column is one, "
+            f"{list(df.columns[:4])}, whose index does not tell trials apart. {SPLIT} If "
+            "every row is one univariate trial, give df.to_numpy(); if every column is one, "
             "df.T.to_numpy()."
         )
 
 
-def _warn_of_exchanged_axes(performances):
-    """Warn of performances (n_features, n_frames), by their first axis, which is not smooth."""
-    n_frames, width = performances[0].shape
-    tested = performances[:_ENOUGH]
-    if {len(x) for x in performances} != {n_frames} or not np.isfinite(np.stack(tested)).all():
+def _warn_of_exchanged_axes(trials):
+    """Warn of trials (n_features, n_frames), by their first axis, which is not smooth."""
+    n_frames, width = trials[0].shape
+    tested = trials[:_ENOUGH]
+    if {len(x) for x in trials} != {n_frames} or not np.isfinite(np.stack(tested)).all():
         return
     if _smoothness(np.stack(tested)) > _NO_TIME:
         warnings.warn(
-            f"Every performance has {n_frames} frames of {width} features, and its features change "
+            f"Every trial has {n_frames} frames of {width} features, and its features change "
             f"more smoothly than its frames.{_EXCHANGED}",
             UserWarning,
             stacklevel=2,
@@ -387,15 +385,15 @@ def _warn_of_exchanged_axes(performances):
 
 
 def _warn_of_one_trial(rows):
-    """Warn of univariate performances in rows that are the frames of a single performance."""
+    """Warn of univariate trials in rows that are the frames of a single trial."""
     n_rows, n_columns = rows.shape
     if n_rows <= max(n_columns, _CLOCK_FRAMES) or not np.isfinite(rows).all():
         return
     if _smoothness(rows[np.newaxis]) < _TIME:
         warnings.warn(
-            f"A 2-D input is taken as {counted(n_rows, 'univariate performance')} of "
+            f"A 2-D input is taken as {counted(n_rows, 'univariate trial')} of "
             f"{n_columns} frames, and its rows change smoothly from one to the next. If it is one "
-            f"performance of {n_rows} frames and {counted(n_columns, 'feature')}, wrap it as [X].",
+            f"trial of {n_rows} frames and {counted(n_columns, 'feature')}, wrap it as [X].",
             UserWarning,
             stacklevel=2,
         )
@@ -413,13 +411,13 @@ def _smoothness(arrays):
     return steps[0] / steps[1] if min(steps) > 0 else np.nan
 
 
-def warn_of_clocks(performances, names):
+def warn_of_clocks(trials, names):
     """Warn of a feature, one of several, that only counts the time."""
-    n_features = performances[0].shape[1]
-    if n_features == 1 or min(map(len, performances)) < _CLOCK_FRAMES:
+    n_features = trials[0].shape[1]
+    if n_features == 1 or min(map(len, trials)) < _CLOCK_FRAMES:
         return
     clocks = np.ones(n_features, dtype=bool)
-    for x in performances:
+    for x in trials:
         step = (x[-1] - x[0]) / (len(x) - 1)
         line = x[0] + step * np.arange(len(x))[:, np.newaxis]
         # On a straight line, within half a step: times are rounded.
@@ -429,30 +427,30 @@ def warn_of_clocks(performances, names):
     for k in np.flatnonzero(clocks):
         name = k if names is None else repr(names[k])
         warnings.warn(
-            f"Feature {name} increases evenly in every performance: it is a clock, not a movement, "
-            "and is matched like one. Leave it out, or give it as time= to to_sequences.",
+            f"Feature {name} increases evenly in every trial: it is a clock, not a movement, "
+            "and is matched like one. Leave it out, or give it as time= to to_trials.",
             UserWarning,
             stacklevel=2,
         )
 
 
-# -- performances that are read in parts, so that few are in memory at a time ---------------
+# -- trials that are read in parts, so that few are in memory at a time ---------------
 
 # Bytes of a number, at most.
 _DOUBLE = 8
-# A part ends with the performance that makes it so many bytes, or so many performances.
+# A part ends with the trial that makes it so many bytes, or so many trials.
 _BYTES, MANY = 1 << 25, 4096
 
 
 def read_source(estimator, source, on_rows):
-    """Yield checked parts of a source, few enough performances at a time for the memory.
+    """Yield checked parts of a source, few enough trials at a time for the memory.
 
     Parameters
     ----------
     estimator : fitted estimator
     source : as `as_source` returns it
     on_rows : bool
-        As for `check_performances`.
+        As for `check_trials`.
     """
     dtype = _dtype_of_maps(source)
     start, portion, size = 0, [], 0
@@ -462,8 +460,8 @@ def read_source(estimator, source, on_rows):
         if size < _BYTES and len(portion) < MANY and i + 1 < len(source):
             continue
         if dtype is None:
-            dtype = as_numbers(portion[0], "Performance 0").dtype
-        yield check_performances(
+            dtype = as_numbers(portion[0], "Trial 0").dtype
+        yield check_trials(
             estimator,
             portion,
             reset=False,
@@ -486,7 +484,7 @@ def _dtype_of_maps(source):
 
 
 def labels_of_parts(labels, levels, names):
-    """The labels of performances that were read in parts, if they differ, without the arrays.
+    """The labels of trials that were read in parts, if they differ, without the arrays.
 
     Parameters
     ----------
@@ -497,4 +495,4 @@ def labels_of_parts(labels, levels, names):
     """
     if len(levels) > 1 or len(set(labels)) < len(labels):
         labels, levels = list(range(len(labels))), {INDEX_NAMES}
-    return Performances((), "list", labels, names=names, levels=levels.pop())
+    return Trials((), "list", labels, names=names, levels=levels.pop())

@@ -10,5 +10,5 @@ def counted(n, noun):
 
 
 def within(name):
-    """A name that begins a sentence, as it stands within one: "performance 3"."""
+    """A name that begins a sentence, as it stands within one: "trial 3"."""
     return name[:1].lower() + name[1:]

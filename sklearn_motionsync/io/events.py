@@ -1,4 +1,4 @@
-"""Events of recordings: they are cut at them into performances, or become key-frames."""
+"""Events of recordings: they are cut at them into trials, or become key-frames."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from ..inputs.recorded import (
 from ..inputs.resampling import as_frame_rates
 from ..inputs.tables import (
     FRAME,
-    PERFORMANCE,
+    TRIAL,
     as_pandas,
     index_of,
     label_of_part,
     labels_of,
-    name_performance,
+    name_trial,
 )
-from ..inputs.types import PerformancesLike, Table, ValuesLike
+from ..inputs.types import Table, TrialsLike, ValuesLike
 from ..inputs.wording import within
 from ..matching.counting import whole
 
@@ -49,7 +49,7 @@ _HELP = (
 # Columns of a table of events, in lower case.
 _EVENTS, _CONTEXT, _FRAMES = ("event", "label"), "context", ("frame", "frames")
 # Names of the column of trials, if one column names them.
-_TRIALS = [PERFORMANCE, "trial"]
+_TRIALS = [TRIAL, "trial"]
 # Frames beyond an end that are rounding.
 _MARGIN = 0.5
 
@@ -59,9 +59,9 @@ def cut_at_events(
     start: str | tuple[str, str],
     stop: str | tuple[str, str] | None = None,
     *,
-    performance: Hashable = None,
+    trial: Hashable = None,
 ) -> list[pd.DataFrame]:
-    """Cut a recording into performances at its events, such as gait cycles at heel strikes.
+    """Cut a recording into trials at its events, such as gait cycles at heel strikes.
 
     Parameters
     ----------
@@ -72,26 +72,26 @@ def cut_at_events(
         been selected before: ``df.iloc[10:]`` begins with frame 10, and ``df.iloc[::2]`` has every
         second frame.
     start : str or (str, str)
-        Label of the events at which a performance begins, or label and context: ``"Foot Strike"``,
+        Label of the events at which a trial begins, or label and context: ``"Foot Strike"``,
         ``("Foot Strike", "Left")``. Case is ignored.
     stop : str or (str, str), default=None
-        Label, or label and context, of the events at which a performance ends. By default it is
-        `start`, so that a performance lasts until the next event of the same kind.
-    performance : hashable, default=None
-        Label of the recording; by default ``df.attrs["performance"]``, if there is one.
+        Label, or label and context, of the events at which a trial ends. By default it is
+        `start`, so that a trial lasts until the next event of the same kind.
+    trial : hashable, default=None
+        Label of the recording; by default ``df.attrs["trial"]``, if there is one.
 
     Returns
     -------
     list of DataFrame (n_frames_i, n_features)
-        The performances by time, one for each `start` that is followed by a `stop`. Both are
+        The trials by time, one for each `start` that is followed by a `stop`. Both are
         included, rounded to the frames that the recording has, and frames are indexed from 0. A
-        performance is left out if another `start` comes before its `stop`, or if one of them lies
+        trial is left out if another `start` comes before its `stop`, or if one of them lies
         outside of the recording. The list is empty if none is complete, or if
-        ``attrs["events"]`` is, as of a static trial. The ``attrs`` of a performance are those of
+        ``attrs["events"]`` is, as of a static trial. The ``attrs`` of a trial are those of
         the recording, with these changed or added:
 
         events : list of dict
-            The events within the performance, with ``frame`` counted from its first frame. The
+            The events within the trial, with ``frame`` counted from its first frame. The
             events at its two ends are left out, so that the others are key-frames.
         rows : list of int
             Its first and last frame, as events count them in the recording.
@@ -101,7 +101,7 @@ def cut_at_events(
             The number of its first frame in the trial, if the recording has ``first_frame``.
         first_time, times : float, list of float
             The time of its first frame and the times of all, in seconds, if the recording has them.
-        performance, levels : hashable, tuple of str
+        trial, levels : hashable, tuple of str
             Its label, 0, 1, ... by time, behind the label of the recording if it has one; and the
             names of the levels of an index of labels.
 
@@ -110,7 +110,7 @@ def cut_at_events(
     ValueError
         If the recording has no ``attrs["events"]``, or none of `start` or `stop`; the message lists
         those that it has. If the index does not tell which frames the rows are, or not in order, or
-        frames of a performance are missing.
+        frames of a trial are missing.
 
     Warns
     -----
@@ -145,7 +145,7 @@ def cut_at_events(
     name = name_recording(df)
     if isinstance(events := df.attrs.get("events"), (list, tuple)) and not events:
         warnings.warn(
-            f"{name} has no events, so no performance is cut out of it.", UserWarning, stacklevel=2
+            f"{name} has no events, so no trial is cut out of it.", UserWarning, stacklevel=2
         )
         return []
     events = _read_events(df, name)
@@ -158,9 +158,9 @@ def cut_at_events(
         rows = recording.rows_between(begin, end)
         if rows is not None:
             cuts.append(_cut(df, recording, rows, other_events))
-    label = df.attrs.get("performance") if performance is None else performance
+    label = df.attrs.get("trial") if trial is None else trial
     for i, cut in enumerate(cuts):
-        cut.attrs |= {"performance": i, "levels": ("performance", FRAME)}
+        cut.attrs |= {"trial": i, "levels": ("trial", FRAME)}
         if label is not None:
             cut.attrs |= label_of_part(label, i, "part", df.attrs.get("levels", ()))
     return cuts
@@ -168,7 +168,7 @@ def cut_at_events(
 
 def name_recording(df):
     """The name of a recording in messages."""
-    label = df.attrs.get("performance")
+    label = df.attrs.get("trial")
     return "The recording" if label is None else f"The recording {str(label)[:60]!r}"
 
 
@@ -280,7 +280,7 @@ def _pair(starts, stops, place):
 
 def _cut(df, recording, rows, events):
     """Some rows, with the ``attrs`` that belong to them."""
-    performance = df.iloc[rows].set_axis(pd.RangeIndex(len(rows), name=FRAME))
+    trial = df.iloc[rows].set_axis(pd.RangeIndex(len(rows), name=FRAME))
     first, last = recording.frames[rows[[0, -1]]].tolist()
     attrs = recording.attrs_of(rows) | {"rows": [first, last]}
     attrs["events"] = [
@@ -290,8 +290,8 @@ def _cut(df, recording, rows, events):
     ]
     if isinstance(number := df.attrs.get("first_frame"), int):
         attrs["first_frame"] = number + whole(first / _rows_per_frame(attrs), "down")
-    performance.attrs = attrs
-    return performance
+    trial.attrs = attrs
+    return trial
 
 
 def _rows_per_frame(attrs):
@@ -307,7 +307,7 @@ def _rows_per_frame(attrs):
 
 
 def keyframes_from_events(
-    X: PerformancesLike,
+    X: TrialsLike,
     events: Table | None = None,
     names: Sequence[str | tuple[str, str]] | None = None,
     *,
@@ -375,7 +375,7 @@ def keyframes_from_events(
     ... })
     >>> keyframes_from_events(trials, events, frame_rate=100)
                  toe-off  knee flexed
-    performance
+    trial
     0               62.0         73.0
     1               75.0          NaN
     2                NaN          NaN
@@ -393,7 +393,7 @@ def keyframes_from_events(
         sequences = list(np.asarray(X))
     refuse_moved_events(sequences)
     labels, levels = labels_of(sequences)
-    trials = [name_performance(i, label) for i, label in enumerate(labels)]
+    trials = [name_trial(i, label) for i, label in enumerate(labels)]
     if events is None:
         listed = [_events_of(x, trial) for x, trial in zip(sequences, trials, strict=True)]
         clocks = [frames_of_rows(x) for x in sequences]

@@ -46,7 +46,7 @@ def find_gaps(df: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     ValueError
-        If `df` is not a DataFrame of such columns, holds several performances, or has values that
+        If `df` is not a DataFrame of such columns, holds several trials, or has values that
         are infinite or not numeric.
 
     See Also
@@ -226,7 +226,7 @@ def _read(df):
     levels = df.index.droplevel(-1) if df.index.nlevels > 1 else df.index[:0]
     if levels.nunique() > 1:
         raise ValueError(
-            f"A recording must be of one performance, got a table of {levels.nunique()}; use "
+            f"A recording must be of one trial, got a table of {levels.nunique()}; use "
             "df.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=10)."
         )
     values = df.to_numpy(copy=True)

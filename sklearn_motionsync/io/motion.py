@@ -110,7 +110,7 @@ def read_motion(
         joints, parents : list of str, list of int
             Names of the joints or markers, and the index of each one's parent, -1 for a root; for
             the group "analog", MOT and STO ``channels`` instead.
-        performance, levels : str, list of str
+        trial, levels : str, list of str
             The name of the file without the ending, and the names of the levels of an index.
 
     Raises
@@ -131,7 +131,7 @@ def read_motion(
     See Also
     --------
     find_gaps : Lists the gaps of a recording.
-    sklearn_motionsync.to_sequences : Makes uneven times even.
+    sklearn_motionsync.to_trials : Makes uneven times even.
     sklearn_motionsync.Skeleton.from_frame : The skeleton of a recording.
 
     Examples
@@ -217,7 +217,7 @@ def _keep_common(recordings):
     for x in recordings:
         lost = [name for name in x.columns if name not in shared]
         if lost:
-            label = x.attrs["performance"][:40]
+            label = x.attrs["trial"][:40]
             losses.append(f"{len(lost)} of {label!r} {listed(lost)}")
     listing = "; ".join(losses[:3]) + f"; and some of {len(losses) - 3} more" * (len(losses) > 3)
     if not common:
@@ -258,7 +258,7 @@ def _to_frame(motion, path):
     index = pd.RangeIndex(len(values), name="frame")
     df = pd.DataFrame(values, columns=columns, index=index, copy=False)
     df.attrs = {"format": path.suffix.lower().removeprefix(".")} | motion
-    df.attrs |= {"performance": path.stem, "levels": ["recording", FRAME]}
+    df.attrs |= {"trial": path.stem, "levels": ["recording", FRAME]}
     return df
 
 
@@ -327,7 +327,7 @@ def describe_times(
         warnings.warn(
             f"{name}: its times are uneven, in steps of {steps.min():.4g} to {steps.max():.4g} "
             f"{unit}, but frames count as evenly spaced. df.attrs['times'] holds them; "
-            "to_sequences(df.assign(time=df.attrs['times']), time='time') makes them even. If they "
+            "to_trials(df.assign(time=df.attrs['times']), time='time') makes them even. If they "
             "are even in truth, give frame_rate=.",
             UserWarning,
             stacklevel=3,

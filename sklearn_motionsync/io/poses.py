@@ -24,7 +24,7 @@ def from_poses(
     min_confidence: float | None = None,
     frame_rate: float | None = None,
     max_gap: int = 0,
-    performance: Hashable = None,
+    trial: Hashable = None,
 ) -> list[pd.DataFrame]:
     """Convert an xarray Dataset of poses, such as one of `movement`, into recordings.
 
@@ -43,7 +43,7 @@ def from_poses(
         Frames per second. By default estimated from the times, or ``fps`` if times are in frames.
     max_gap : int, default=0
         The longest gap to interpolate, in frames; see `fill_gaps`. By default none is.
-    performance : hashable, default=None
+    trial : hashable, default=None
         Label of the recording, such as the name of its file; the name of the individual follows
         it. A tuple has a level for each of its items. By default the name of the individual
         alone is the label.
@@ -57,8 +57,8 @@ def from_poses(
         (frames per second; None if it is not known, or times are uneven), ``units`` (None), ``up``
         ("-y" in the plane, as y points down in pictures; None in space), ``kind`` ("keypoints"),
         ``joints``, ``parents`` (-1 for all), ``first_time`` (seconds) if times are in seconds,
-        ``times`` if they are uneven, ``performance`` (the name of the individual, or
-        ``(performance, individual)``) and ``levels``.
+        ``times`` if they are uneven, ``trial`` (the name of the individual, or
+        ``(trial, individual)``) and ``levels``.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def from_poses(
     ...     coords={"space": ["x", "y"], "keypoint": ["hip", "knee"], "individual": ["ann"]},
     ... )
     >>> (ann,) = from_poses(xr.Dataset({"position": position}, attrs={"fps": 30}))
-    >>> list(ann.columns), ann.attrs["frame_rate"], ann.attrs["performance"]
+    >>> list(ann.columns), ann.attrs["frame_rate"], ann.attrs["trial"]
     (['hip_x', 'hip_y', 'knee_x', 'knee_y'], 30.0, 'ann')
     """
     check_frame_rate(frame_rate)
@@ -122,9 +122,9 @@ def from_poses(
     recordings = []
     for i, individual in enumerate(_read_names(position, "individual")):
         df = pd.DataFrame(values[:, i].reshape(len(values), -1), columns=columns, index=index)
-        df.attrs = facts | {"performance": individual, "levels": ("individual", FRAME)}
-        if performance is not None:
-            df.attrs |= label_of_part(performance, individual, "individual")
+        df.attrs = facts | {"trial": individual, "levels": ("individual", FRAME)}
+        if trial is not None:
+            df.attrs |= label_of_part(trial, individual, "individual")
         recordings.append(df if max_gap == 0 else fill_gaps(df, max_gap))
     return recordings
 

@@ -16,7 +16,7 @@ from ..inputs.collections import check_members
 from ..inputs.facts import units_of_columns
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import frame_rate_of_rows, start_of_rows
-from ..inputs.types import Path, PerformanceLike, Table
+from ..inputs.types import Path, Table, TrialLike
 from ..inputs.wording import counted
 from .motion import check_frame_rate, read_motion
 
@@ -35,14 +35,14 @@ _DIGITS = 6
 
 def write_motion(
     path: Path,
-    X: PerformanceLike,
+    X: TrialLike,
     skeleton: Skeleton | None = None,
     *,
     like: Path | Table | None = None,
     frame_rate: float | None = None,
     in_place: bool = False,
 ) -> None:
-    """Write one performance into a motion file: BVH, TRC, or OpenSim's MOT and STO.
+    """Write one trial into a motion file: BVH, TRC, or OpenSim's MOT and STO.
 
     BVH has rotations: a body that was recorded, synchronised, blended or sampled is put on a rig,
     whose bones keep their length. TRC has positions. MOT and STO have any columns.
@@ -123,7 +123,7 @@ def write_motion(
 
 def _read_positions(X, skeleton, path):
     """Joints, parents, positions (n_frames, n_joints, 3), and the vertical axis."""
-    # A single frame is no performance, but a pose that a file may hold: it is checked as two.
+    # A single frame is no trial, but a pose that a file may hold: it is checked as two.
     is_pose = isinstance(X, (np.ndarray, pd.DataFrame)) and len(X) == 1
     (x,) = check_members([np.repeat(X, 2, axis=0) if is_pose else X], finite="allow-nan")
     x = x[:1] if is_pose else x

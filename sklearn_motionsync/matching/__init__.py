@@ -1,4 +1,4 @@
-"""The matching: all that the paper computes between two performances, on NumPy and SciPy alone.
+"""The matching: all that the paper computes between two trials, on NumPy and SciPy alone.
 
 ``costs`` (Eqs. 12, 16), ``trellis`` on ``tile`` (Eqs. 13-17), ``median`` (Eq. 19), ``warps`` (Eqs.
 7, 18); beyond the paper ``metric``, ``consensus``, ``sharpening``, ``refinement``, ``gaps`` and

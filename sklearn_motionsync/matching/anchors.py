@@ -1,6 +1,6 @@
 """Anchors: known key-frames, as an additional cost of the one trellis.
 
-A key-frame at the time ``k`` of a performance of duration ``T`` is a column beside its features:
+A key-frame at the time ``k`` of a trial of duration ``T`` is a column beside its features:
 the ramp ``(t - k) / T``. It is linear in time, so it is normalised and sampled as a feature is. It
 is NaN if the key-frame is not known. The samples p of a base beside its key-frame, at a position q
 of a moving sequence, cost what the ramp there says::
@@ -95,13 +95,13 @@ class Anchors(NamedTuple):
 
 
 def add_ramps(arrays, keyframes):
-    """Performances with a column for every key-frame.
+    """Trials with a column for every key-frame.
 
     Parameters
     ----------
     arrays : sequence of ndarray (n_frames_i, n_features)
     keyframes : ndarray, shape (n_sequences, n_keyframes)
-        As shares of the performances; NaN where one is not known.
+        As shares of the trials; NaN where one is not known.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def add_ramps(arrays, keyframes):
 
 
 def first_meeting(times, keyframes):
-    """Frames of the pattern (n_sequences, n_keyframes) that meet key-frames of performances.
+    """Frames of the pattern (n_sequences, n_keyframes) that meet key-frames of trials.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def pin(times, keyframes, own):
     keyframes : ndarray, shape (n_keyframes,)
         Of the pattern, in frames, increasing.
     own : ndarray, shape (n_sequences, n_keyframes)
-        Of each performance, in frames of the clock, increasing; NaN where one is not known.
+        Of each trial, in frames of the clock, increasing; NaN where one is not known.
 
     Returns
     -------

@@ -14,14 +14,14 @@ RATE_WEIGHT = 0.2
 
 
 class Cost(NamedTuple):
-    """One way to compare performances.
+    """One way to compare trials.
 
     Attributes
     ----------
     of_velocity : bool
-        Whether velocities are compared: smoothed derivatives of the postures, by the frame.
+        Whether velocities are compared: smoothed derivatives of the poses, by the frame.
     transform : callable or None
-        Function of postures, or velocities, (n_sequences, Q, n_features) that gives the features;
+        Function of poses, or velocities, (n_sequences, Q, n_features) that gives the features;
         None for the same.
     weights : callable
         ``weights(rates)``: ``b``, ``g`` and ``phi`` of `StepTable` at local rates.
@@ -63,13 +63,13 @@ class StepTable(NamedTuple):
     subframes: int
 
 
-def step_table(cost="posture", max_rate=2, subframes=1):
+def step_table(cost="pose", max_rate=2, subframes=1):
     """Build the step table of a cost.
 
     ==========  ========  ===========  =============
     cost        b_s       g_s          phi
     ==========  ========  ===========  =============
-    posture     1         2            abs(rho - 1)
+    pose     1         2            abs(rho - 1)
     velocity    omega^2   2 omega      (rho - 1)^2
     elastic     rho       2 sqrt(rho)  (rho - 1)^2
     ==========  ========  ===========  =============
@@ -81,8 +81,8 @@ def step_table(cost="posture", max_rate=2, subframes=1):
 
     Parameters
     ----------
-    cost : {"posture", "velocity", "elastic"}, default="posture"
-        ``"posture"`` with the other defaults is exactly Eqs. 12 and 16.
+    cost : {"pose", "velocity", "elastic"}, default="pose"
+        ``"pose"`` with the other defaults is exactly Eqs. 12 and 16.
     max_rate : float, default=2
         Largest local rate; 2 is the limit that follows from Eq. 13.
     subframes : int, default=1
@@ -129,7 +129,7 @@ def group_steps(table, mu, slopes):
 # -- the costs ------------------------------------------------------------------------------
 
 
-def _posture_weights(rates):
+def _pose_weights(rates):
     ones = np.ones(len(rates))
     return ones, 2 * ones, np.abs(rates - 1)
 
@@ -151,5 +151,5 @@ def _elastic_weights(rates):
 COSTS = {
     "velocity": Cost(True, None, _velocity_weights),
     "elastic": Cost(True, _square_root_velocity, _elastic_weights),
-    "posture": Cost(False, None, _posture_weights),
+    "pose": Cost(False, None, _pose_weights),
 }

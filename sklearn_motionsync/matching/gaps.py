@@ -1,7 +1,7 @@
 """Gaps: what was hidden is filled by what was seen, and weighed by how well that tells it.
 
 A short gap is interpolated over time. In a longer one hidden features are expected, given all that
-was seen of the performance: postures are taken to be normal, and correlated over time. So a hidden
+was seen of the trial: poses are taken to be normal, and correlated over time. So a hidden
 arm follows the other limbs, and joins smoothly what was seen before and after the gap. What remains
 unknown of a frame is a share of it, and its complement the weight of the frame in the trellis. So a
 short gap counts nearly like none, and a frame of which nothing is known counts nothing.
@@ -85,15 +85,15 @@ def interpolate_gaps(values, longest=np.inf, times=None, held=False, straight=Fa
     return out
 
 
-def fill_with_mean(performances, mean):
-    """Performances on one clock whose gaps follow a mean performance.
+def fill_with_mean(trials, mean):
+    """Trials on one clock whose gaps follow a mean trial.
 
     Deviations from the mean go on in straight lines, and are held at the ends. They are 0 in
-    features that a performance never shows.
+    features that a trial never shows.
 
     Parameters
     ----------
-    performances : ndarray, shape (n, P, n_features)
+    trials : ndarray, shape (n, P, n_features)
         With NaN in gaps.
     mean : ndarray, shape (P, n_features)
 
@@ -102,19 +102,17 @@ def fill_with_mean(performances, mean):
     ndarray, shape (n, P, n_features)
         The same array if there is no gap.
     """
-    if not is_gappy(performances):
-        return performances
-    hidden, filled = np.isnan(performances), performances.copy()
+    if not is_gappy(trials):
+        return trials
+    hidden, filled = np.isnan(trials), trials.copy()
     for i in np.flatnonzero(hidden.any(axis=(1, 2))):
-        deviations = np.nan_to_num(
-            interpolate_gaps(performances[i] - mean, held=True, straight=True)
-        )
+        deviations = np.nan_to_num(interpolate_gaps(trials[i] - mean, held=True, straight=True))
         np.copyto(filled[i], mean + deviations, where=hidden[i], casting="same_kind")
     return filled
 
 
 def moments_of_seen(arrays):
-    """Mean and covariance of postures with gaps, each of the postures that show it.
+    """Mean and covariance of poses with gaps, each of the poses that show it.
 
     Parameters
     ----------
@@ -125,7 +123,7 @@ def moments_of_seen(arrays):
     -------
     mean : ndarray of float64, shape (n_features,)
     covariance : ndarray of float64, shape (n_features, n_features)
-        Divided by the number of postures. Negative eigenvalues count by their size.
+        Divided by the number of poses. Negative eigenvalues count by their size.
     """
     seen = [np.isfinite(x).astype(np.float64) for x in arrays]
     counts = sum(s.sum(axis=0) for s in seen)
@@ -141,19 +139,19 @@ def moments_of_seen(arrays):
 
 
 class Filler(NamedTuple):
-    """Fills the gaps of performances.
+    """Fills the gaps of trials.
 
-    Postures are normal. Over time all features are correlated alike: they forget their value with
+    Poses are normal. Over time all features are correlated alike: they forget their value with
     one time constant, and their velocity with another, as an autoregression of second order does.
 
     Attributes
     ----------
     mean, scale : ndarray, shape (n_features,)
-        Postures less the mean, divided by the scale, are in standard units.
+        Poses less the mean, divided by the scale, are in standard units.
     precision : ndarray, shape (n_features, n_features)
         The inverse of their covariance in these units, with the variance of a noise.
     variance : ndarray, shape (n_features,)
-        Of the postures, in which velocities take part alike.
+        Of the poses, in which velocities take part alike.
     times : tuple of float
         In which values and velocities are forgotten, in frames; 0 if frames have no order.
     """
@@ -174,14 +172,14 @@ class Filler(NamedTuple):
 
     @classmethod
     def of(cls, mean, covariance, arrays):
-        """The filler of postures with these moments.
+        """The filler of poses with these moments.
 
         Parameters
         ----------
         mean : ndarray, shape (n_features,)
         covariance : ndarray, shape (n_features, n_features)
         arrays : sequence of ndarray (n_frames_i, n_features)
-            Performances, with NaN where nothing was seen; empty if frames have no order.
+            Trials, with NaN where nothing was seen; empty if frames have no order.
         """
         mean, covariance = (np.asarray(a, dtype=np.float64) for a in (mean, covariance))
         variance = np.diag(covariance)
@@ -190,7 +188,7 @@ class Filler(NamedTuple):
         # Constant features have no unit, and predict nothing.
         noise = np.where(varies, SHRINKAGE, 1)
         precision = np.linalg.inv(covariance / np.outer(scale, scale) + np.diag(noise))
-        # A few of many performances, evenly spread, tell how fast postures change.
+        # A few of many trials, evenly spread, tell how fast poses change.
         arrays = arrays[:: -(-len(arrays) // BATCH) or 1]
         standard = [(x - mean) / scale for x in arrays]
         velocities = [np.diff(z, axis=0) for z in standard]
@@ -198,7 +196,7 @@ class Filler(NamedTuple):
         return cls(mean, scale, precision, variance, times)
 
     def __call__(self, array, confidence=1.0):
-        """A performance without gaps, and the weight of each of its frames.
+        """A trial without gaps, and the weight of each of its frames.
 
         Parameters
         ----------
@@ -226,14 +224,14 @@ class Filler(NamedTuple):
         return self.expect(array).astype(array.dtype), np.clip(weights, 0, 1)
 
     def expect(self, array, timed=True):
-        """A performance whose hidden values are expected, given all that was seen of it.
+        """A trial whose hidden values are expected, given all that was seen of it.
 
         Parameters
         ----------
         array : ndarray, shape (n_frames, n_features)
             NaN where a feature is hidden.
         timed : bool, default=True
-            Whether rows are the frames of one performance, in order.
+            Whether rows are the frames of one trial, in order.
 
         Returns
         -------
@@ -264,7 +262,7 @@ class Filler(NamedTuple):
 
 
 def add_weights(arrays, weights):
-    """Performances with a column of weights behind their features.
+    """Trials with a column of weights behind their features.
 
     Parameters
     ----------
@@ -319,7 +317,7 @@ def _correlation_time(arrays):
                 return float(-1 / np.log(max(now, 0.01)))
             return float(lag - lag / 2 * (1 / np.e - now) / (before - now))
         lag, before = 2 * lag, now
-    # Performances shorter than that.
+    # Trials shorter than that.
     return float(longest)
 
 

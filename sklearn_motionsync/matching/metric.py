@@ -1,4 +1,4 @@
-"""Metric: velocity and posture, weighted by how well they tell a moment of the action.
+"""Metric: velocity and pose, weighted by how well they tell a moment of the action.
 
 Without a metric noisy directions of the features count as much as reliable ones.
 `metric_of_matches` estimates their reliability from the training set, `Metric` applies it. The
@@ -28,7 +28,7 @@ __all__ = [
 
 
 class Metric(NamedTuple):
-    """How velocities and postures become the points that are compared.
+    """How velocities and poses become the points that are compared.
 
     Attributes
     ----------
@@ -38,15 +38,15 @@ class Metric(NamedTuple):
         Mean squared speed of the training set, in these features.
     velocity : ndarray, shape (n_used, n_compared)
         Applied to compressed velocities.
-    posture : ndarray, shape (n_used, n_compared)
-        Applied to postures less their own mean over time: the place of a subject, or a limb held
+    pose : ndarray, shape (n_used, n_compared)
+        Applied to poses less their own mean over time: the place of a subject, or a limb held
         still, identifies no moment.
     """
 
     features: np.ndarray
     energy: float
     velocity: np.ndarray
-    posture: np.ndarray
+    pose: np.ndarray
 
     def __call__(self, velocity, positions):
         """Features of sequences in the metric: (n_sequences, Q, n_compared).
@@ -56,15 +56,15 @@ class Metric(NamedTuple):
         velocity, positions : ndarray, shape (n_sequences, Q, n_features)
             In the unit.
         """
-        fast, postures = self._parts(velocity, positions)
-        return self.of_parts(fast, postures)
+        fast, poses = self._parts(velocity, positions)
+        return self.of_parts(fast, poses)
 
-    def of_parts(self, velocity, postures):
-        """The same of compressed velocities and centred postures (..., n_used)."""
-        dtype = postures.dtype
+    def of_parts(self, velocity, poses):
+        """The same of compressed velocities and centred poses (..., n_used)."""
+        dtype = poses.dtype
         # Products of one sequence each: results do not depend on the other sequences.
         out = velocity @ self.velocity.astype(dtype, copy=False)
-        out += postures @ self.posture.astype(dtype, copy=False)
+        out += poses @ self.pose.astype(dtype, copy=False)
         return out
 
     def shares(self, velocity, positions):
@@ -72,7 +72,7 @@ class Metric(NamedTuple):
         fast, poses = self._parts(velocity, positions)
         compared, shares = self.of_parts(fast, poses), np.zeros(positions.shape[2])
         compared = compared.reshape(-1, compared.shape[2])
-        for curves, weights in ((fast, self.velocity), (poses, self.posture)):
+        for curves, weights in ((fast, self.velocity), (poses, self.pose)):
             frames = curves.reshape(-1, curves.shape[2])
             shares[self.features] += (frames.T @ compared * weights).sum(axis=1)
         return shares / shares.sum()
@@ -93,7 +93,7 @@ class Metric(NamedTuple):
         rows = [place[int(k)] for k in columns[used]]
         speed = np.square(velocity[:, :, used]).sum(axis=2, dtype=np.float64)
         energy = float(speed.mean())
-        return Metric(used, energy, self.velocity[rows], self.posture[rows]) if energy else None
+        return Metric(used, energy, self.velocity[rows], self.pose[rows]) if energy else None
 
     def _parts(self, velocity, positions):
         fast = compressed(velocity[:, :, self.features], self.energy)
@@ -167,7 +167,7 @@ class Evidence(NamedTuple):
         return cls(float(distance / count / offset), remaining)
 
 
-# Standard errors of the agreement between performances from which on a feature is reliable.
+# Standard errors of the agreement between trials from which on a feature is reliable.
 _RELIABLE = 2.0
 # Share of a feature's mean variance that is added to all of them, before anything is inverted.
 RIDGE = 0.03
@@ -191,7 +191,7 @@ def metric_of_matches(match, positions, velocity):
         ``match(features, partners)``: voted times (n_sequences, n_partners, P) of all sequences as
         bases, each with partners of its own, by their indices (n_sequences, n_partners).
     positions, velocity : ndarray, shape (n_sequences, P, n_features)
-        Postures on the clock and their velocities, in the unit.
+        Poses on the clock and their velocities, in the unit.
 
     Returns
     -------
@@ -201,8 +201,8 @@ def metric_of_matches(match, positions, velocity):
     moves = positions.any(axis=(0, 1)) & velocity.any(axis=(0, 1))
     if len(positions) < 2 or not moves.any():
         return None
-    postures = without_mean(positions)
-    block = np.concatenate([postures, velocity], axis=2)
+    poses = without_mean(positions)
+    block = np.concatenate([poses, velocity], axis=2)
     errors = _errors(block)
     used = moves & _are_reliable(_agreement(block), errors)
     used = used if used.any() else moves
@@ -220,26 +220,24 @@ def metric_of_matches(match, positions, velocity):
     if not used[moves].all():
         used |= moves & _are_reliable(_agreement(block, matched), errors)
     energy = _mean_square_speed(velocity[:, :, used])
-    postures, fast = postures[:, :, used], compressed(velocity[:, :, used], energy)
+    poses, fast = poses[:, :, used], compressed(velocity[:, :, used], energy)
     columns = slice(None) if used.all() else used
-    matched_postures = matched[..., :n_features][..., columns]
+    matched_poses = matched[..., :n_features][..., columns]
     matched_velocity = matched[..., n_features:][..., columns]
-    of_postures, posture_length = _differences(postures, matched_postures)
+    of_poses, pose_length = _differences(poses, matched_poses)
     of_fast, fast_length = _differences(fast, _at_rates(matched_velocity, energy, times))
     by_fast = _square_root(metric_matrix(fast, of_fast))
     # Differences of a longer correlation length are fewer independent observations.
-    weight = np.sqrt(fast_length / posture_length)
-    by_postures = _square_root(metric_matrix(postures, of_postures)) * weight
-    axes = _principal_axes(np.concatenate([fast @ by_fast, postures @ by_postures], axis=2))
+    weight = np.sqrt(fast_length / pose_length)
+    by_poses = _square_root(metric_matrix(poses, of_poses)) * weight
+    axes = _principal_axes(np.concatenate([fast @ by_fast, poses @ by_poses], axis=2))
     if axes is None:
         return None
     n_used = len(by_fast)
-    metric = Metric(
-        np.flatnonzero(used), energy, by_fast @ axes[:n_used], by_postures @ axes[n_used:]
-    )
-    roots = by_fast, by_postures
-    before = _energy(roots, (_unmatched_covariance(fast), _unmatched_covariance(postures)))
-    after = _energy(roots, (of_fast, of_postures))
+    metric = Metric(np.flatnonzero(used), energy, by_fast @ axes[:n_used], by_poses @ axes[n_used:])
+    roots = by_fast, by_poses
+    before = _energy(roots, (_unmatched_covariance(fast), _unmatched_covariance(poses)))
+    after = _energy(roots, (of_fast, of_poses))
     return metric, Evidence.of(times, after / before if before > 0 else np.nan)
 
 
@@ -253,13 +251,13 @@ def _mean_square_speed(velocity):
 
 
 def _are_reliable(agreement, errors):
-    """Whether performances agree in a feature, in posture and velocity together: (n_features,)."""
+    """Whether trials agree in a feature, in pose and velocity together: (n_features,)."""
     evidence = (agreement / errors).reshape(2, -1)
     return evidence.sum(axis=0) / np.sqrt(2) > _RELIABLE
 
 
 def _agreement(block, matched=None):
-    """Mean correlation of two performances in every feature: (n_features,).
+    """Mean correlation of two trials in every feature: (n_features,).
 
     Parameters
     ----------
@@ -285,7 +283,7 @@ def _errors(block):
     """Standard errors of the agreement of independent series: (n_features,).
 
     The correlation of two independent series of autocorrelation r has the standard deviation
-    ``sqrt((1 + 2 sum r^2) / P)``; all pairs of performances are taken as independent.
+    ``sqrt((1 + 2 sum r^2) / P)``; all pairs of trials are taken as independent.
     """
     n_sequences, n_frames = block.shape[:2]
     # Power spectra along time, long enough for all lags.

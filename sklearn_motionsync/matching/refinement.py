@@ -1,8 +1,8 @@
 """Refinement: from a good warp to the best one for sequences of a single source.
 
 Repeated trials of one source (a machine, a neuron, one trained athlete) have the same
-postures but for noise and gain, so postures can place a moment to a fraction of a frame.
-The postures of different people differ by style, and refining by them makes warps worse.
+poses but for noise and gain, so poses can place a moment to a fraction of a frame.
+The poses of different people differ by style, and refining by them makes warps worse.
 ``unexplained_variance`` tells which is the case.
 
 Averages over features are weighted by their variance, and copies are discounted, so that neither
@@ -59,7 +59,7 @@ class Refiner(NamedTuple):
         return cls(_smoothed(pattern[np.newaxis], noise_width)[0], noise_width)
 
     def __call__(self, poses, times, reach):
-        """Gauss-Newton steps along the tangent that bring matched postures together.
+        """Gauss-Newton steps along the tangent that bring matched poses together.
 
         Each step solves for the whole warp at once::
 
@@ -250,7 +250,7 @@ def _fit_gain(base, matched):
     middle = base.mean(axis=1, keepdims=True)
     x, y = base - middle, matched - matched.mean(axis=1, keepdims=True)
     energy = np.square(y).sum(axis=1, keepdims=True)
-    # Constant features and constant postures fit with any gain: it is 1.
+    # Constant features and constant poses fit with any gain: it is 1.
     ridge = EQUAL[y.dtype] * energy.max(axis=2, keepdims=True)
     ridge[ridge == 0] = 1
     gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)

@@ -72,7 +72,7 @@ class Sharpener(NamedTuple):
 
     @classmethod
     def learn(cls, metric, pattern, positions, times):
-        """The sharpener of some performances, given their warps; None if it has no evidence.
+        """The sharpener of some trials, given their warps; None if it has no evidence.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class Sharpener(NamedTuple):
         pattern : ndarray, shape (P, n_features)
             In the unit.
         positions : ndarray, shape (n_sequences, P, n_features)
-            At least one other performance, in the unit.
+            At least one other trial, in the unit.
         times : ndarray, shape (n_sequences, P)
             Their warps.
         """
@@ -145,7 +145,7 @@ class Sharpener(NamedTuple):
         Parameters
         ----------
         positions : ndarray, shape (n_sequences, P, n_features)
-            Performances in the unit.
+            Trials in the unit.
         times : ndarray, shape (n_sequences, P)
             Their warps after the vote.
         reach : int

@@ -64,7 +64,7 @@ def uncertainty_of_paths(matcher, base, moving, times):
     base : ndarray, shape (1, P, n_features)
         Features of the pattern.
     moving : ndarray, shape (n_sequences, Q, n_features)
-        Features of the performances.
+        Features of the trials.
     times : ndarray, shape (n_sequences, P)
         Their warps.
 

@@ -1,4 +1,4 @@
-"""Unit: postures are centred and scaled to about 1 before they are compared.
+"""Unit: poses are centred and scaled to about 1 before they are compared.
 
 The scale is a power of two, so it changes no bit: warps do not depend on the unit of the data.
 """
@@ -23,7 +23,7 @@ class Unit(NamedTuple):
     Attributes
     ----------
     centre : ndarray, shape (n_features,)
-        Mean posture of the training set, in the unit: centred features keep inner products small.
+        Mean pose of the training set, in the unit: centred features keep inner products small.
     size : float
         The unit: a power of four, so that its square root is a power of two, too.
     rounding : ndarray, shape (n_features,)
@@ -57,17 +57,17 @@ class Unit(NamedTuple):
         inverse = centre.dtype.type(1 / size)
         return cls(centre * inverse, size, np.where(varies, 0, rounding * inverse), copies)
 
-    def __call__(self, postures, out=None):
-        """Centred postures (..., n_features) in this unit; constant features are exactly 0.
+    def __call__(self, poses, out=None):
+        """Centred poses (..., n_features) in this unit; constant features are exactly 0.
 
         Further columns stay as they are.
         """
         n_features = len(self.centre)
-        if postures.shape[-1] > n_features:
-            out = postures.copy() if out is None else out
-            self(postures[..., :n_features], out[..., :n_features])
+        if poses.shape[-1] > n_features:
+            out = poses.copy() if out is None else out
+            self(poses[..., :n_features], out[..., :n_features])
             return out
-        out = np.multiply(postures, postures.dtype.type(1 / self.size), out=out)
+        out = np.multiply(poses, poses.dtype.type(1 / self.size), out=out)
         out -= self.centre
         constant = np.flatnonzero(self.rounding)
         if len(constant):

@@ -1,4 +1,4 @@
-"""Measures of how well performances are synchronised, and scorers for grid searches."""
+"""Measures of how well trials are synchronised, and scorers for grid searches."""
 
 from .measures import group_timing_error, keyframe_error
 from .scorers import FeatureHoldoutScorer, SpreadScorer

@@ -1,4 +1,4 @@
-"""How well performances are synchronised: timing errors, where the truth is known.
+"""How well trials are synchronised: timing errors, where the truth is known.
 
 Warps are the ``times`` of a `Match`: tau(p), shape (n_sequences, P), from 0 to P - 1, in frames of
 the common clock. They may decrease.
@@ -30,9 +30,9 @@ def group_timing_error(
 ) -> float:
     """Mean absolute difference of the moments that a group shows at the same frame of the clock.
 
-    With ``phi_m`` the true share of the action that is completed at each frame of performance m:
+    With ``phi_m`` the true share of the action that is completed at each frame of trial m:
     ``(P-1) mean_{m,p} |phi_m(tau_m(p)) - mean_m phi_m(tau_m(p))|``. It needs no pattern. It is 0 if
-    and only if all performances show the same moment at every frame; of one performance alone it
+    and only if all trials show the same moment at every frame; of one trial alone it
     is 0.
 
     Parameters
@@ -40,7 +40,7 @@ def group_timing_error(
     times : array-like, shape (n_sequences, P)
         Warps, from 0 to P - 1.
     moments : list of array-like (n_frames_i,)
-        ``phi``, from 0 to 1 and never decreasing, at the performances' own frames, such as
+        ``phi``, from 0 to 1 and never decreasing, at the trials' own frames, such as
         ``make_bending().times``.
 
     Returns
@@ -88,11 +88,11 @@ def keyframe_error(
     times : array-like, shape (n_sequences, P)
         Warps, from 0 to P - 1.
     keyframes : array-like, shape (n_sequences, n_keyframes)
-        True key-frames, in the performances' own frames, from 0 to ``n_frames_i - 1``, increasing.
+        True key-frames, in the trials' own frames, from 0 to ``n_frames_i - 1``, increasing.
     pattern_keyframes : array-like, shape (n_keyframes,)
         Those of the pattern, in frames of the clock, from 0 to ``P - 1``, increasing.
     n_frames : array-like of int, shape (n_sequences,)
-        Lengths of the performances, at least 2.
+        Lengths of the trials, at least 2.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def keyframe_error(
     ------
     ValueError
         If the numbers of warps, key-frames and lengths differ, or a key-frame is outside its
-        performance.
+        trial.
 
     Examples
     --------
@@ -128,7 +128,7 @@ def _as_warps(times) -> np.ndarray:
     times = as_numbers(times, "times", dtype=np.float64)
     if times.ndim != 2 or times.shape[0] < 1 or times.shape[1] < 2:
         raise ValueError(
-            "times must have shape (n_sequences, P), one row a performance and P at least 2, "
+            "times must have shape (n_sequences, P), one row a trial and P at least 2, "
             f"got {times.shape}."
         )
     last = times.shape[1] - 1
@@ -136,7 +136,7 @@ def _as_warps(times) -> np.ndarray:
     if not inside.all():
         i, p = np.argwhere(~inside)[0]
         raise ValueError(
-            f"Performance {i}: times must be from 0 to P - 1 = {last}, in frames of the clock, "
+            f"Trial {i}: times must be from 0 to P - 1 = {last}, in frames of the clock, "
             f"got {times[i, p]:.10g} at frame {p}."
         )
     return np.clip(times, 0, last)
@@ -152,45 +152,44 @@ def _as_moments(moments, n_sequences) -> list[np.ndarray]:
     for i, phi in enumerate(rows):
         if phi.ndim != 1 or len(phi) < 2:
             raise ValueError(
-                f"Performance {i}: moments must have shape (n_frames,), one a frame of the "
-                f"performance and at least 2, got {phi.shape}."
+                f"Trial {i}: moments must have shape (n_frames,), one a frame of the "
+                f"trial and at least 2, got {phi.shape}."
             )
         inside = _is_inside(phi, 1)
         if not inside.all():
             p = int(np.argmin(inside))
             raise ValueError(
-                f"Performance {i}: moments are shares of the action, from 0 to 1, got {phi[p]:.10g}"
+                f"Trial {i}: moments are shares of the action, from 0 to 1, got {phi[p]:.10g}"
                 f" at frame {p}. For seconds give (t - t[0]) / (t[-1] - t[0])."
             )
         decreases = np.diff(phi) < -_ROUNDING
         if decreases.any():
             raise ValueError(
-                f"Performance {i}: moments must not decrease; they do after frame "
+                f"Trial {i}: moments must not decrease; they do after frame "
                 f"{int(np.argmax(decreases))}."
             )
     return [np.clip(phi, 0, 1) for phi in rows]
 
 
 def _as_lengths(n_frames, n_sequences):
-    """Lengths of performances as floats: whole numbers of at least 2, one a warp."""
+    """Lengths of trials as floats: whole numbers of at least 2, one a warp."""
     lengths = as_numbers(n_frames, "n_frames", dtype=np.float64)
     if lengths.shape != (n_sequences,):
         raise ValueError(
-            f"n_frames must be the lengths of the {counted(n_sequences, 'performance')}, such as "
+            f"n_frames must be the lengths of the {counted(n_sequences, 'trial')}, such as "
             f"[len(x) for x in X], got shape {lengths.shape}."
         )
     valid = (lengths >= 2) & (lengths == np.floor(lengths)) & np.isfinite(lengths)
     if not valid.all():
         i = int(np.argmin(valid))
         raise ValueError(
-            f"Performance {i}: n_frames must be a whole number of at least 2, got "
-            f"{lengths[i]:.10g}."
+            f"Trial {i}: n_frames must be a whole number of at least 2, got {lengths[i]:.10g}."
         )
     return lengths
 
 
 def _as_keyframes(keyframes, pattern_keyframes, lengths, n_frames):
-    """Key-frames (n_sequences, n_keyframes) of performances, and (n_keyframes,) of the pattern."""
+    """Key-frames (n_sequences, n_keyframes) of trials, and (n_keyframes,) of the pattern."""
     pattern = as_numbers(pattern_keyframes, "pattern_keyframes", dtype=np.float64)
     if pattern.ndim != 1 or len(pattern) < 1:
         raise ValueError(
@@ -206,16 +205,16 @@ def _as_keyframes(keyframes, pattern_keyframes, lengths, n_frames):
         )
     pattern = _in_order(pattern, n_frames - 1, "The pattern", "frames of the clock")
     for i, (row, length) in enumerate(zip(rows, lengths, strict=True)):
-        refuse_seconds(row, int(length), f"Performance {i}")
+        refuse_seconds(row, int(length), f"Trial {i}")
     frames = [
-        _in_order(row, length - 1, f"Performance {i}", "its own frames")
+        _in_order(row, length - 1, f"Trial {i}", "its own frames")
         for i, (row, length) in enumerate(zip(rows, lengths, strict=True))
     ]
     return np.stack(frames), pattern
 
 
 def _in_order(frames, last, whose, unit):
-    """Key-frames of one performance, if they are inside it and increase."""
+    """Key-frames of one trial, if they are inside it and increase."""
     if not (_is_inside(frames, last).all() and (np.diff(frames) > 0).all()):
         raise ValueError(
             f"{whose}: key-frames must increase and be from 0 to {last:.10g}, in {unit}, got "
@@ -225,17 +224,14 @@ def _in_order(frames, last, whose, unit):
 
 
 def _as_rows(values, what):
-    """The entries of a list or the rows of a table as arrays, one a performance."""
+    """The entries of a list or the rows of a table as arrays, one a trial."""
     if isinstance(values, pd.DataFrame):
         values = as_numbers(values, what)
     if isinstance(values, (str, bytes, dict)) or not np.iterable(values):
         raise ValueError(
-            f"{what} must be a list of arrays, one a performance, got {type(values).__name__}."
+            f"{what} must be a list of arrays, one a trial, got {type(values).__name__}."
         )
-    return [
-        as_numbers(row, f"Performance {i}: {what}", dtype=np.float64)
-        for i, row in enumerate(values)
-    ]
+    return [as_numbers(row, f"Trial {i}: {what}", dtype=np.float64) for i, row in enumerate(values)]
 
 
 def _is_inside(array, last):

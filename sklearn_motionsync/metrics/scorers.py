@@ -13,7 +13,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils.metadata_routing import MetadataRequest
 
 from ..inputs.keyframes import Keyframes
-from ..inputs.types import PerformancesLike, RandomState
+from ..inputs.types import RandomState, TrialsLike
 from ..matching.warps import normalise
 from ..utils.pipelines import accepted_params, route_to_synchronizer
 from .spread import least_squares
@@ -72,7 +72,7 @@ class _SynchronizerScorer(BaseEstimator):
         return getattr(self, "_requests", {"keyframes": None})
 
     def _reach(self, estimator, X, params, uses=("match",)):
-        """The synchronizer and the performances, at least two."""
+        """The synchronizer and the trials, at least two."""
         name = type(self).__name__
         hint = (
             f"; in cross_val_score and searches by metadata routing, sklearn.set_config("
@@ -80,9 +80,9 @@ class _SynchronizerScorer(BaseEstimator):
             "and params={{'{name}': [...]}} or search.fit(X, {name}=[...])"
         )
         reached = route_to_synchronizer(estimator, X, params, f"{name}()", uses=uses, hint=hint)
-        if len(reached.performances) < 2:
+        if len(reached.trials) < 2:
             raise ValueError(
-                f"{name} measures how much performances differ from each other, and got one. "
+                f"{name} measures how much trials differ from each other, and got one. "
                 "In cross-validation each test fold needs at least 2: instead of LeaveOneOut use "
                 "fewer folds, such as cv=2 or KFold(len(X) // 2), or LeavePOut(2)."
             )
@@ -96,9 +96,9 @@ class SpreadScorer(_SynchronizerScorer):
 
     Notes
     -----
-    It judges the fitted pattern: performances are matched with it, and nothing is fitted anew. The
+    It judges the fitted pattern: trials are matched with it, and nothing is fitted anew. The
     spread of matched features rewards over-warping: prefer `FeatureHoldoutScorer` to choose
-    parameters. Scores need at least two performances, so ``LeaveOneOut`` cannot be used.
+    parameters. Scores need at least two trials, so ``LeaveOneOut`` cannot be used.
 
     Examples
     --------
@@ -114,16 +114,16 @@ class SpreadScorer(_SynchronizerScorer):
     """
 
     def __call__(
-        self, estimator: BaseEstimator, X: PerformancesLike, y: object = None, **params: Any
+        self, estimator: BaseEstimator, X: TrialsLike, y: object = None, **params: Any
     ) -> float:
-        """Score a fitted estimator on performances.
+        """Score a fitted estimator on trials.
 
         Parameters
         ----------
         estimator : synchronizer or Pipeline
             Fitted; the pipeline has a synchronizer.
         X : list of arrays, 3-D array or DataFrame
-            At least two performances, as for the estimator.
+            At least two trials, as for the estimator.
         y : ignored
             Present for API consistency.
         **params : dict
@@ -138,28 +138,28 @@ class SpreadScorer(_SynchronizerScorer):
         Raises
         ------
         ValueError
-            If there is no synchronizer, a single performance, or the synchronizer needs key-frames
+            If there is no synchronizer, a single trial, or the synchronizer needs key-frames
             and gets none.
         TypeError
             If the synchronizer does not accept one of the params.
         """
         reached = self._reach(estimator, X, params)
-        before = reached.synchronizer.normalize(reached.performances)
-        return -least_squares(before, reached.match().warp(reached.performances))
+        before = reached.synchronizer.normalize(reached.trials)
+        return -least_squares(before, reached.match().warp(reached.trials))
 
 
 class FeatureHoldoutScorer(_SynchronizerScorer):
     """Scorer of the parameters of a synchronizer, by the spread of features that it does not see.
 
     It is right to choose parameters, as in a grid search. It ignores the pattern that was fitted,
-    and ``pattern=``: clones of the synchronizer are fitted anew, on the performances that are
+    and ``pattern=``: clones of the synchronizer are fitted anew, on the trials that are
     scored. In cross-validation that is the test fold. Of a fit only ``n_frames_`` and the steps
     before the synchronizer count. To judge a fitted pattern by people held out, use `SpreadScorer`,
     or `group_timing_error` where the true moments are known.
 
     Features are divided into ``n_folds`` folds. For each fold a clone is fitted without it, to a
     median pattern. Its warps are scored by the spread of the fold alone, `least_squares` negated,
-    which over-warping does not reduce. The clones are given the key-frames of the performances that
+    which over-warping does not reduce. The clones are given the key-frames of the trials that
     are scored, but for those that none of these has.
 
     Parameters
@@ -192,16 +192,16 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         self.random_state = random_state
 
     def __call__(
-        self, estimator: BaseEstimator, X: PerformancesLike, y: object = None, **params: Any
+        self, estimator: BaseEstimator, X: TrialsLike, y: object = None, **params: Any
     ) -> float:
-        """Score a fitted estimator on performances.
+        """Score a fitted estimator on trials.
 
         Parameters
         ----------
         estimator : synchronizer or Pipeline
             Fitted; the pipeline has a synchronizer.
         X : list of arrays, 3-D array or DataFrame
-            At least two performances of at least ``n_folds`` features, as for the estimator.
+            At least two trials of at least ``n_folds`` features, as for the estimator.
         y : ignored
             Present for API consistency.
         **params : dict
@@ -216,17 +216,17 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         Raises
         ------
         ValueError
-            If there is no synchronizer, a single performance, a single feature, or the synchronizer
+            If there is no synchronizer, a single trial, a single feature, or the synchronizer
             needs key-frames and gets none.
         TypeError
             If the synchronizer does not accept one of the params.
         """
         reached = self._reach(estimator, X, params, ("match", "fit"))
-        synchronizer, performances = reached.synchronizer, reached.performances
-        n_features = performances[0].shape[1]
+        synchronizer, trials = reached.synchronizer, reached.trials
+        n_features = trials[0].shape[1]
         if n_features < 2:
             raise ValueError(
-                "FeatureHoldoutScorer holds features out, and these performances have only one, as "
+                "FeatureHoldoutScorer holds features out, and these trials have only one, as "
                 "have all rows of a 2-D array: use SpreadScorer. "
                 f"(n_folds={self.n_folds!r} must be from 2 to the number of features.)"
             )
@@ -238,7 +238,7 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         if reached.takes_params:
             # Metadata that the estimator needs are missing for its clones, too.
             reached.match()
-        params = known_keyframes(performances, params)
+        params = known_keyframes(trials, params)
         fit_params, match_params = (
             accepted_params(method, params) for method in (synchronizer.fit, synchronizer.match)
         )
@@ -249,27 +249,25 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
             refitted = clone(synchronizer).set_params(
                 n_frames=synchronizer.n_frames_, pattern="median"
             )
-            seen, hidden = (
-                [x[:, features] for x in performances] for features in (shown, held_out)
-            )
+            seen, hidden = ([x[:, features] for x in trials] for features in (shown, held_out))
             match = refitted.fit(seen, **fit_params).match(seen, **match_params)
             before = normalise(hidden, synchronizer.n_frames_)
             scores.append(-least_squares(before, match.warp(hidden)))
         return float(np.mean(scores))
 
 
-def known_keyframes(performances, params):
-    """Metadata without the key-frames that are known in none of these performances.
+def known_keyframes(trials, params):
+    """Metadata without the key-frames that are known in none of these trials.
 
     Where labels are few, a fold may have none.
     """
     if params.get("keyframes") is None:
         return params
-    keyframes = Keyframes(params["keyframes"], len(performances), params.get("frame_rate"))
-    shares = keyframes.shares(performances)
+    keyframes = Keyframes(params["keyframes"], len(trials), params.get("frame_rate"))
+    shares = keyframes.shares(trials)
     is_known = np.isfinite(shares).any(axis=0)
     if is_known.all():
         return params
     metadata = {name: params[name] for name in params if name not in ("keyframes", "frame_rate")}
-    last = np.array([[len(x) - 1] for x in performances])
+    last = np.array([[len(x) - 1] for x in trials])
     return metadata | ({"keyframes": (shares * last)[:, is_known]} if is_known.any() else {})

@@ -1,4 +1,4 @@
-"""Spread: how much performances differ from each other, before and after synchronising.
+"""Spread: how much trials differ from each other, before and after synchronising.
 
 Ratios are of squares: where all differences are halved they are 0.25.
 """
@@ -12,7 +12,7 @@ import pandas as pd
 
 from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, check_finite, nanmean
-from ..inputs.types import PerformancesLike
+from ..inputs.types import TrialsLike
 
 __all__ = [
     "amplitude_phase_variance",
@@ -21,11 +21,11 @@ __all__ = [
 ]
 
 
-def least_squares(before: PerformancesLike, after: PerformancesLike) -> float:
-    """Ratio of squared differences after and before: 1 for no gain, 0 for identical performances.
+def least_squares(before: TrialsLike, after: TrialsLike) -> float:
+    """Ratio of squared differences after and before: 1 for no gain, 0 for identical trials.
 
     ``mean_i  int |y_i - mean_{j != i} y_j|^2 dt / int |x_i - mean_{j != i} x_j|^2 dt``, the norm
-    over all features. Performances that equal the mean of the others before are left out.
+    over all features. Trials that equal the mean of the others before are left out.
 
     Parameters
     ----------
@@ -37,12 +37,12 @@ def least_squares(before: PerformancesLike, after: PerformancesLike) -> float:
     -------
     float
         The ratio of squares: 0.25 where all differences are halved. It does not depend on the unit.
-        1 if all performances were identical before and are after.
+        1 if all trials were identical before and are after.
 
     Raises
     ------
     ValueError
-        If they are not of one shape, infinite, or all NaN; or performances that were identical
+        If they are not of one shape, infinite, or all NaN; or trials that were identical
         before are not after.
 
     Notes
@@ -70,7 +70,7 @@ def least_squares(before: PerformancesLike, after: PerformancesLike) -> float:
     return float(np.mean(new[counts] / old[counts]))
 
 
-def sobolev_least_squares(before: PerformancesLike, after: PerformancesLike) -> float:
+def sobolev_least_squares(before: TrialsLike, after: TrialsLike) -> float:
     """Ratio of squared differences of velocities after and before; 1 for no gain.
 
     ``sum_i int |y_i' - mean_j y_j'|^2 dt / sum_i int |x_i' - mean_j x_j'|^2 dt``
@@ -110,7 +110,7 @@ def sobolev_least_squares(before: PerformancesLike, after: PerformancesLike) -> 
 
 
 class AmplitudePhase(NamedTuple):
-    """The result of `amplitude_phase_variance`, in squares of the unit of the performances.
+    """The result of `amplitude_phase_variance`, in squares of the unit of the trials.
 
     Parameters
     ----------
@@ -121,9 +121,9 @@ class AmplitudePhase(NamedTuple):
     total : float
         ``MSE_total``, the sum of both: the variance before synchronising.
     phase_share : float
-        ``R^2 = MSE_phase / MSE_total``; NaN if performances did not differ.
+        ``R^2 = MSE_phase / MSE_total``; NaN if trials did not differ.
     constant : float
-        ``C_R``: the ratio of the energies of the performances before and after warping.
+        ``C_R``: the ratio of the energies of the trials before and after warping.
     """
 
     amplitude: float
@@ -133,10 +133,10 @@ class AmplitudePhase(NamedTuple):
     constant: float
 
 
-def amplitude_phase_variance(before: PerformancesLike, after: PerformancesLike) -> AmplitudePhase:
-    """Split the variance of performances into that of their shapes and that of their timing.
+def amplitude_phase_variance(before: TrialsLike, after: TrialsLike) -> AmplitudePhase:
+    """Split the variance of trials into that of their shapes and that of their timing.
 
-    With ``x_i`` before and ``y_i`` after synchronising, means over the N performances written as
+    With ``x_i`` before and ``y_i`` after synchronising, means over the N trials written as
     ``xm`` and ``ym``, and ``|.|`` taken over all features:
 
     - ``MSE_total = 1/N sum_i int |x_i - xm|^2 dt``
@@ -202,7 +202,7 @@ def amplitude_phase_variance(before: PerformancesLike, after: PerformancesLike) 
     if energy == 0 < energy_left or energy_left == 0 < energy:
         raise ValueError(
             "One of before and after is zero everywhere, and the other is not. Give the same "
-            "performances, normalised and synchronised."
+            "trials, normalised and synchronised."
         )
     amplitude = energy * (total_left / energy_left) if energy_left > 0 else 0.0
     differ = total > x.shape[2] * tolerance**2
@@ -215,7 +215,7 @@ def amplitude_phase_variance(before: PerformancesLike, after: PerformancesLike) 
 
 
 def _check_pair(before, after, *, allow_nan=True):
-    """The same performances before and after, each with the size of its rounding errors.
+    """The same trials before and after, each with the size of its rounding errors.
 
     With ``allow_nan`` NaN is what was hidden.
 
@@ -234,9 +234,9 @@ def _check_pair(before, after, *, allow_nan=True):
         )
     for z, name in zip(pair, ("before", "after"), strict=True):
         for i, x in enumerate(z):
-            check_finite(x, f"{name}, performance {i}, frame", allow_nan=allow_nan)
+            check_finite(x, f"{name}, trial {i}, frame", allow_nan=allow_nan)
             if np.isnan(x).all():
-                raise ValueError(f"{name}, performance {i}: all is NaN. Leave it out.")
+                raise ValueError(f"{name}, trial {i}: all is NaN. Leave it out.")
     eps = [np.finfo(z.dtype).eps + len(z) * np.finfo(np.float64).eps for z in pair]
     return [
         (z.astype(np.float64), 4 * e * np.nanmax(np.abs(z))) for z, e in zip(pair, eps, strict=True)
@@ -244,7 +244,7 @@ def _check_pair(before, after, *, allow_nan=True):
 
 
 def _on_clock(values, what):
-    """Performances on one clock as an array."""
+    """Trials on one clock as an array."""
     if isinstance(values, pd.DataFrame) and values.index.nlevels >= 2:
         values = as_collection(values)
     if isinstance(values, np.ndarray) and values.dtype == object and values.ndim == 1:
@@ -253,7 +253,7 @@ def _on_clock(values, what):
         shapes = [np.shape(x) for x in values if hasattr(x, "shape")]
         if len(set(shapes)) > 1:
             raise ValueError(
-                f"{what} must be performances on one clock, all of one shape (P, n_features), got "
+                f"{what} must be trials on one clock, all of one shape (P, n_features), got "
                 f"{shapes[0]} and {next(s for s in shapes if s != shapes[0])}: give those that "
                 "transform or normalize return."
             )
@@ -288,19 +288,19 @@ def _without_spread_before(none_after, what):
     if none_after:
         return 1.0
     raise ValueError(
-        f"The performances are {what} before and are not after: the ratio is not defined. "
-        "Compare with performances that differ, such as normalize(X) of a synchronizer."
+        f"The trials are {what} before and are not after: the ratio is not defined. "
+        "Compare with trials that differ, such as normalize(X) of a synchronizer."
     )
 
 
 def _variance(z):
-    """The mean over performances of the integral of their squared distance from the mean."""
+    """The mean over trials of the integral of their squared distance from the mean."""
     # Relative to the first one, so that identical ones differ by exactly 0.
     z = z - z[0]
     return _energy(z - z.mean(axis=0))
 
 
 def _energy(z):
-    """The mean over performances of ``int |z_i|^2 dt`` over [0, 1], by the trapezoidal rule."""
+    """The mean over trials of ``int |z_i|^2 dt`` over [0, 1], by the trapezoidal rule."""
     squares = np.square(z).sum(axis=2).mean(axis=0)
     return float(np.trapezoid(squares, dx=1 / (len(squares) - 1)))

@@ -19,14 +19,14 @@ __all__ = [
     "t_prediction_limit",
 ]
 
-# Variance of the logarithm over performances of one action (16 actions of people); it weighs as
-# much as that of so many performances. That of a dissimilarity is the mean over 21 actions.
+# Variance of the logarithm over trials of one action (16 actions of people); it weighs as
+# much as that of so many trials. That of a dissimilarity is the mean over 21 actions.
 _PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
 DISSIMILARITY_VARIANCE = 0.12
 # Smaller dissimilarities, and energies as a share of the total variance, are rounding.
 LEAST = 1e-9
 # The weight of tests but the main one. With it the area under the curve is .97 and .91 of wrong
-# performances (HDM05, UTKinect) and .94 of exercises done wrong (UI-PRMD); with 1 it is .96, .91
+# trials (HDM05, UTKinect) and .94 of exercises done wrong (UI-PRMD); with 1 it is .96, .91
 # and .92, with 0 .96, .86 and .95.
 _WEIGHT = 0.15
 # Prior variance of the score, which is about 1, and of a contrast.
@@ -127,7 +127,7 @@ def dissimilarity_tails(held_out, new=None):
     Parameters
     ----------
     held_out : ndarray (n,)
-        Of training performances to those of other people.
+        Of training trials to those of other people.
     new : ndarray (n_new,), default=None
         By default those held out.
     """
@@ -139,20 +139,20 @@ def dissimilarity_tails(held_out, new=None):
 
 @dataclass(frozen=True)
 class Acceptance:
-    """The score of all tests and its limit, by training performances held out.
+    """The score of all tests and its limit, by training trials held out.
 
     ``score^2 = - sum_k w_k log p_k``: Fisher's combination of the probabilities ``p_k`` of
     deviations as large, weighted, as tests differ in what they tell. The limit is the prediction
-    limit of the scores of training performances, by Student's t distribution.
+    limit of the scores of training trials, by Student's t distribution.
 
     Parameters
     ----------
     held_out : dict of str to ndarray (n,)
-        The logarithms of the probabilities of every test, of training performances.
+        The logarithms of the probabilities of every test, of training trials.
     groups : ndarray of int (n,)
         Their people. Scores of one person are alike, so the error of the mean is that of people.
     coverage : float
-        Share of new performances that are accepted.
+        Share of new trials that are accepted.
     main : str, default="movement"
         The test with weight 1.
     """
@@ -231,17 +231,17 @@ class LogPredictionInterval:
 
 
 class Contrast:
-    """How much a performance is the action rather than its image under an exchange.
+    """How much a trial is the action rather than its image under an exchange.
 
     An exchange is one that undoes itself, such as left for right. The differences ``d`` of training
-    performances from their images have a mean ``m``. The contrast of a performance is
+    trials from their images have a mean ``m``. The contrast of a trial is
     ``<d, m> / (|m|^2 + c)``: about 1 for the action and -1 for its image, and 0 where the action
     is its own image. ``c`` is a share of the variance of d, so that a mean that is noise counts
     little.
 
     Parameters
     ----------
-    performances : ndarray (n, P, n_features)
+    trials : ndarray (n, P, n_features)
         Of training, without gaps.
     exchange : callable
         Makes images (n, P, n_features).
@@ -251,17 +251,17 @@ class Contrast:
     Attributes
     ----------
     middle : float
-        The mean contrast of training performances.
+        The mean contrast of training trials.
     is_clear : bool
         Whether the action and its image differ clearly: whether it is two standard deviations, and
         ``|m|^2``, less the mean over time, a tenth of the squared movement.
     """
 
-    def __init__(self, performances, exchange, groups):
+    def __init__(self, trials, exchange, groups):
         self._exchange = exchange
-        d = self._differences(performances)
+        d = self._differences(trials)
         self._mean = d.mean(axis=0)
-        moved = np.square(performances - performances.mean(axis=1, keepdims=True))
+        moved = np.square(trials - trials.mean(axis=1, keepdims=True))
         # Above 0, and no rounding.
         least = LEAST * moved.sum() / len(d) + np.finfo(float).tiny
         self._noise = _NOISE * np.square(d - self._mean).sum() / len(d) + least
@@ -273,15 +273,15 @@ class Contrast:
         is_large = changes.sum() >= _LARGE * moved.sum() / len(d)
         self.is_clear = bool(is_large and self.middle >= _CLEAR * std)
 
-    def standardize(self, performances):
+    def standardize(self, trials):
         """Contrasts on the scale on which 0 is the action, 1 as much the image, 2 the image."""
-        return 1 - self._contrasts(self._differences(performances), self._mean) / self.middle
+        return 1 - self._contrasts(self._differences(trials), self._mean) / self.middle
 
-    def _differences(self, performances):
-        return performances - self._exchange(performances)
+    def _differences(self, trials):
+        return trials - self._exchange(trials)
 
     def _contrasts(self, d, mean):
         d, mean = (x.reshape(-1, d[0].size) for x in (d, mean))
-        # Row by row, so that no contrast depends on other performances.
+        # Row by row, so that no contrast depends on other trials.
         products, length = np.vecdot(d, mean), np.vecdot(mean, mean) + self._noise
         return products / length

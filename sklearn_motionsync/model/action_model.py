@@ -1,4 +1,4 @@
-"""The action model: mean performance, variance at every posture, envelope (section 4)."""
+"""The action model: mean trial, variance at every pose, envelope (section 4)."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from sklearn.utils import check_consistent_length, check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.collections import Performances
+from ..inputs.collections import Trials
 from ..inputs.numbers import as_numbers, check_finite, check_names
-from ..inputs.types import Labels, PerformanceLike, PerformancesLike, RandomState, ValuesLike
+from ..inputs.types import Labels, RandomState, TrialLike, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..inputs.wording import counted
 from ..matching.gaps import fill_with_mean, is_gappy
@@ -25,13 +25,13 @@ from ..utils.groups import encode_groups, group_counts
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .acceptance import LEAST, log_moments
-from .similarity import Neighbours, PerformanceStream, PersonalReference, learn_weights
+from .similarity import Neighbours, PersonalReference, TrialStream, learn_weights
 from .variation import (
     clock_error,
     mean_band,
     predictive_variance,
-    sample_performances,
-    sample_postures,
+    sample_poses,
+    sample_trials,
     simultaneous_factor,
 )
 
@@ -50,8 +50,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     >>> import numpy as np
     >>> from sklearn_motionsync import ActionModel
     >>> t = np.linspace(0, 1, 20)[:, np.newaxis]
-    >>> performances = [a * np.sin(3 * t) for a in (0.9, 1.0, 1.1, 1.2)]
-    >>> model = ActionModel().fit(performances)
+    >>> trials = [a * np.sin(3 * t) for a in (0.9, 1.0, 1.1, 1.2)]
+    >>> model = ActionModel().fit(trials)
     >>> model.predict([1.05 * np.sin(3 * t), 0 * t, np.sin(6 * t)]).tolist()
     [1, -1, -1]
     >>> model.accepts([[0.15], [0.9]], frame=19).tolist()
@@ -62,30 +62,30 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     n_std : float, default=3.0
         Half-width of the envelope, in standard deviations.
     coverage : float, default=0.95
-        Share of performances of new people that ``predict`` is to accept, between 0 and 1.
+        Share of trials of new people that ``predict`` is to accept, between 0 and 1.
 
     Attributes
     ----------
     mean_ : ndarray, shape (P, n_features)
-        The mean performance.
+        The mean trial.
     variance_ : ndarray, shape (P, n_features)
-        The variance of the performances (divided by their number) at every posture.
+        The variance of the trials (divided by their number) at every pose.
     predictive_variance_ : ndarray, shape (P, n_features)
         The variance to be expected of a new person about the mean: estimated by leaving groups
         out, shrunk a little towards its mean over the frames, never 0.
     missing_ : ndarray, shape (P, n_features)
-        The share of the performances of which a value was missing (NaN).
+        The share of the trials of which a value was missing (NaN).
     deviations_ : ndarray, shape (n_kept, P, n_features)
-        Training performances less the mean: those that others are compared with and drawn from.
+        Training trials less the mean: those that others are compared with and drawn from.
         At most 64, one of every group and the rest evenly spread. In a gap they go on in a straight
         line from one end to the other.
     groups_ : ndarray of int, shape (n_kept,)
         The groups of these, counted from 0 in the order of their first appearance.
     dissimilarities_ : ndarray, shape (n_sequences,)
-        Of every training performance to those of other groups that are kept; after
+        Of every training trial to those of other groups that are kept; after
         ``partial_fit``, of those of its last call.
     n_samples_seen_ : int
-        Performances in all calls.
+        Trials in all calls.
     threshold_ : float
         The largest dissimilarity that is accepted.
     n_frames_ : int
@@ -149,19 +149,19 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     # -- fitting ------------------------------------------------------------------------------
 
     @validated
-    def fit(self, X: PerformancesLike, y: object = None, groups: Labels | None = None) -> Self:
-        """Estimate the mean performance, the variances and the threshold.
+    def fit(self, X: TrialsLike, y: object = None, groups: Labels | None = None) -> Self:
+        """Estimate the mean trial, the variances and the threshold.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances; NaN where something was not seen. The rows of a 2-D array
+            Synchronised trials; NaN where something was not seen. The rows of a 2-D array
             are univariate ones.
         y : ignored
             Present for API consistency.
         groups : array-like, shape (n_sequences,), default=None
-            The subject of each performance, or what else makes performances resemble each other,
-            such as a session. By default every performance is a group of its own.
+            The subject of each trial, or what else makes trials resemble each other,
+            such as a session. By default every trial is a group of its own.
 
         Returns
         -------
@@ -171,68 +171,66 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         Raises
         ------
         ValueError
-            If the performances have different lengths, or there is only one, or all are of one
-            group, or there is not a group for each; if nothing of a performance was seen, or a
+            If the trials have different lengths, or there is only one, or all are of one
+            group, or there is not a group for each; if nothing of a trial was seen, or a
             value was seen in fewer than two groups.
         """
-        performances = _check_synchronised(self._check_training_set(X))
-        if len(performances) < 2:
+        trials = _check_synchronised(self._check_training_set(X))
+        if len(trials) < 2:
             raise ValueError(
-                "A model of how performances vary needs at least 2 performances, got n_samples = 1."
+                "A model of how trials vary needs at least 2 trials, got n_samples = 1."
             )
-        encode_groups(groups, len(performances), at_least=2)
+        encode_groups(groups, len(trials), at_least=2)
         with self._progress(fits=True):
-            stream = PerformanceStream.starting_at(performances[0])
-            learnt = self._learn(stream, performances, groups)
+            stream = TrialStream.starting_at(trials[0])
+            learnt = self._learn(stream, trials, groups)
             if learnt["_unseen"]:
                 raise ValueError(
-                    f"{learnt['_unseen']}. Give more performances, leave out the feature, or fill "
+                    f"{learnt['_unseen']}. Give more trials, leave out the feature, or fill "
                     "gaps before, as by fill_gaps of sklearn_motionsync.io."
                 )
         self.__dict__.update(learnt)
         return self
 
     @validated
-    def partial_fit(
-        self, X: PerformancesLike, y: object = None, groups: Labels | None = None
-    ) -> Self:
-        """Update the model with more performances.
+    def partial_fit(self, X: TrialsLike, y: object = None, groups: Labels | None = None) -> Self:
+        """Update the model with more trials.
 
         For more data than memory holds, and for data that come in later. The model keeps at most
-        64 performances, so a call takes the same time however many came before, and the labels of
-        all groups. Mean, variances and the performances that are kept equal those of one ``fit``
+        64 trials, so a call takes the same time however many came before, and the labels of
+        all groups. Mean, variances and the trials that are kept equal those of one ``fit``
         on all, to the last bit, however they are divided into calls. So does the threshold of up
-        to 64 performances; of more, those of earlier calls enter it with the dissimilarity that
+        to 64 trials; of more, those of earlier calls enter it with the dissimilarity that
         they had when they were last compared.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances, at least one, on the clock of the earlier ones. The rows of a
+            Synchronised trials, at least one, on the clock of the earlier ones. The rows of a
             2-D array are univariate ones.
         y : ignored
             Present for API consistency.
         groups : array-like, shape (n_sequences,), default=None
-            The subject of each performance. A label is the same subject in all calls. By default
-            every performance is a group of its own.
+            The subject of each trial. A label is the same subject in all calls. By default
+            every trial is a group of its own.
 
         Returns
         -------
         self : ActionModel
-            The updated model. As long as all performances are of one group, or a value was seen in
+            The updated model. As long as all trials are of one group, or a value was seen in
             one group only, only ``mean_`` and ``variance_`` are known, and other methods raise
             `NotFittedError`.
 
         Raises
         ------
         ValueError
-            If the performances have different lengths, or another length than the earlier ones;
+            If the trials have different lengths, or another length than the earlier ones;
             if there is not a group for each; if a parameter has become invalid. The model does not
             change then.
 
         Examples
         --------
-        Pipelines have no ``partial_fit``: fit the steps before the model on some performances, and
+        Pipelines have no ``partial_fit``: fit the steps before the model on some trials, and
         give it what they make of all, portion by portion.
 
         >>> from sklearn.pipeline import make_pipeline
@@ -249,26 +247,26 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         # Scikit-learn validates parameters in the first call only.
         self._validate_params()
         if hasattr(self, "_stream"):
-            performances, stream = self._check_clock(X), self._stream
+            trials, stream = self._check_clock(X), self._stream
         else:
-            performances = _check_synchronised(self._check_training_set(X))
-            stream = PerformanceStream.starting_at(performances[0])
-        self.__dict__.update(self._learn(stream, performances, groups))
+            trials = _check_synchronised(self._check_training_set(X))
+            stream = TrialStream.starting_at(trials[0])
+        self.__dict__.update(self._learn(stream, trials, groups))
         return self
 
     @property
     def deviations_(self) -> np.ndarray:
-        """Training performances that are kept, less the mean: (n_kept, P, n_features)."""
+        """Training trials that are kept, less the mean: (n_kept, P, n_features)."""
         check_is_fitted(self, "mean_")
         return fill_with_mean(self._stream.kept, self.mean_) - self.mean_
 
-    def check_performances(self, X: PerformancesLike) -> Performances:
-        """Check that performances are synchronised, and to the clock of the model.
+    def check_trials(self, X: TrialsLike) -> Trials:
+        """Check that trials are synchronised, and to the clock of the model.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances. The rows of a 2-D array are univariate ones.
+            Synchronised trials. The rows of a 2-D array are univariate ones.
 
         Returns
         -------
@@ -278,40 +276,40 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         Raises
         ------
         ValueError
-            If the input breaks the contract, or performances have another length than the model.
+            If the input breaks the contract, or trials have another length than the model.
         """
         self._check_groups_seen()
         return self._check_clock(X)
 
-    # -- whole performances -------------------------------------------------------------------
+    # -- whole trials -------------------------------------------------------------------
 
-    def score_samples(self, X: PerformancesLike) -> np.ndarray:
-        """Log-density of performances: independent normal distributions at every posture.
+    def score_samples(self, X: TrialsLike) -> np.ndarray:
+        """Log-density of trials: independent normal distributions at every pose.
 
-        For the choice between models of different actions. Not for whether a performance is the
-        action at all, which `predict` tells: standing still at the mean posture is dense.
+        For the choice between models of different actions. Not for whether a trial is the
+        action at all, which `predict` tells: standing still at the mean pose is dense.
 
         It is a sum over all frames and features, in the unit of the data. Compare it only between
         models of equal ``P``, features and scaling. See `score` for what to use instead.
 
         With gaps (NaN) it is the density of what was seen, the marginal one: a sum over fewer
-        values. It compares models of one performance as it does without gaps. Two performances with
+        values. It compares models of one trial as it does without gaps. Two trials with
         different gaps have sums of different length: compare their `dissimilarity`.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances.
+            Synchronised trials.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
             The natural logarithm of the density.
         """
-        performances = self.check_performances(X)
+        trials = self.check_trials(X)
         std = np.sqrt(np.maximum(self.variance_, self._variance_floor))
-        densities = np.empty(len(performances))
-        for i, x in enumerate(performances):
+        densities = np.empty(len(trials))
+        for i, x in enumerate(trials):
             # Of what was seen.
             seen, squares = ~np.isnan(x), np.nansum(np.square((x - self.mean_) / std))
             log_std = np.log(std[seen]).sum(dtype=np.float64)
@@ -320,11 +318,11 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
 
     def score(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         y: object = None,
         sample_weight: ValuesLike | None = None,
     ) -> float:
-        """Mean log-density of performances, to compare models of equal ``P``, features and scaling.
+        """Mean log-density of trials, to compare models of equal ``P``, features and scaling.
 
         It is a sum over all frames and features: twice the frames double it, and another unit
         changes it. To choose ``n_frames`` and the parameters of a synchronizer, give the search
@@ -334,11 +332,11 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances.
+            Synchronised trials.
         y : ignored
             Present for API consistency.
         sample_weight : array-like, shape (n_sequences,), default=None
-            The weight of each performance; by default all are equal.
+            The weight of each trial; by default all are equal.
 
         Returns
         -------
@@ -350,59 +348,55 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             check_consistent_length(densities, sample_weight)
         return float(np.average(densities, weights=sample_weight))
 
-    def dissimilarity(
-        self, X: PerformancesLike, reference: PerformancesLike | None = None
-    ) -> np.ndarray:
-        """Mean dissimilarity of performances to the three most similar training performances.
+    def dissimilarity(self, X: TrialsLike, reference: TrialsLike | None = None) -> np.ndarray:
+        """Mean dissimilarity of trials to the three most similar training trials.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances.
+            Synchronised trials.
         reference : as X, default=None
-            Good performances of the person that X is of, two to five (note 5).
+            Good trials of the person that X is of, two to five (note 5).
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            0 for equal performances, 1 for standing still.
+            0 for equal trials, 1 for standing still.
 
         Raises
         ------
         ValueError
-            With a reference, if no group of the training set has two performances.
+            With a reference, if no group of the training set has two trials.
         """
-        performances = self.check_performances(X)
-        return self._judge(reference).dissimilarity(performances)
+        trials = self.check_trials(X)
+        return self._judge(reference).dissimilarity(trials)
 
-    def decision_function(
-        self, X: PerformancesLike, reference: PerformancesLike | None = None
-    ) -> np.ndarray:
-        """How far below the threshold the dissimilarity of performances is, as a logarithm.
+    def decision_function(self, X: TrialsLike, reference: TrialsLike | None = None) -> np.ndarray:
+        """How far below the threshold the dissimilarity of trials is, as a logarithm.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances.
+            Synchronised trials.
         reference : as X, default=None
             As for `dissimilarity`.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            ``log(threshold / dissimilarity)``: negative for performances that are rejected.
+            ``log(threshold / dissimilarity)``: negative for trials that are rejected.
         """
-        performances, judge = self.check_performances(X), self._judge(reference)
+        trials, judge = self.check_trials(X), self._judge(reference)
         limit = self.threshold_ if reference is None else judge.limit(self.coverage)
-        return np.log(limit / np.maximum(judge.dissimilarity(performances), LEAST))
+        return np.log(limit / np.maximum(judge.dissimilarity(trials), LEAST))
 
-    def predict(self, X: PerformancesLike, reference: PerformancesLike | None = None) -> np.ndarray:
-        """Whether performances are the action.
+    def predict(self, X: TrialsLike, reference: TrialsLike | None = None) -> np.ndarray:
+        """Whether trials are the action.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances.
+            Synchronised trials.
         reference : as X, default=None
             As for `dissimilarity`.
 
@@ -413,51 +407,51 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         """
         return np.where(self.decision_function(X, reference) >= 0, 1, -1)
 
-    # -- postures, bands and samples ----------------------------------------------------------
+    # -- poses, bands and samples ----------------------------------------------------------
 
-    def accepts(self, postures: PerformanceLike, frame: int) -> np.ndarray:
-        """Whether postures lie inside the envelope at a frame.
+    def accepts(self, poses: TrialLike, frame: int) -> np.ndarray:
+        """Whether poses lie inside the envelope at a frame.
 
-        For a tracker, which prunes postures that are not possible at this instant. It does not
-        tell whether a performance is the action: `predict` does.
+        For a tracker, which prunes poses that are not possible at this instant. It does not
+        tell whether a trial is the action: `predict` does.
 
         Parameters
         ----------
-        postures : array-like, shape (n_postures, n_features)
-            Postures, in the features of the model. One that was not seen (NaN) rejects nothing.
+        poses : array-like, shape (n_poses, n_features)
+            Poses, in the features of the model. One that was not seen (NaN) rejects nothing.
         frame : int
             Frame of the model, 0 to P - 1.
 
         Returns
         -------
-        ndarray of bool, shape (n_postures,)
-            Whether all features of a posture lie inside.
+        ndarray of bool, shape (n_poses,)
+            Whether all features of a pose lie inside.
         """
         self._check_groups_seen()
         frame = self._check_frame(frame)
         names = names_of_input(self)
-        check_names(postures, names, "postures")
-        postures = as_numbers(postures, "postures", dtype=self.mean_.dtype)
+        check_names(poses, names, "poses")
+        poses = as_numbers(poses, "poses", dtype=self.mean_.dtype)
         width = self.mean_.shape[1]
-        if postures.ndim != 2 or postures.shape[1] != width:
+        if poses.ndim != 2 or poses.shape[1] != width:
             raise ValueError(
-                f"postures must have shape (n_postures, {width}), got {postures.shape}. Give one "
-                "posture as [posture]."
+                f"poses must have shape (n_poses, {width}), got {poses.shape}. Give one "
+                "pose as [pose]."
             )
-        check_finite(postures, "postures, row", names, allow_nan=True)
+        check_finite(poses, "poses, row", names, allow_nan=True)
         mean, half_width = self.mean_[frame], self.n_std * np.sqrt(self.variance_[frame])
-        outside = (postures < mean - half_width) | (postures > mean + half_width)
+        outside = (poses < mean - half_width) | (poses > mean + half_width)
         return ~outside.any(axis=1)
 
     def envelope(self, simultaneous: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """A band about the mean performance, for postures or for whole performances.
+        """A band about the mean trial, for poses or for whole trials.
 
         Parameters
         ----------
         simultaneous : bool, default=False
-            False: ``n_std`` standard deviations of the training performances on both sides. At 3
-            it holds nearly all *postures* of people, but few whole performances: most leave it
-            at some frame. True: it holds ``coverage`` of the *whole performances* of new people,
+            False: ``n_std`` standard deviations of the training trials on both sides. At 3
+            it holds nearly all *poses* of people, but few whole trials: most leave it
+            at some frame. True: it holds ``coverage`` of the *whole trials* of new people,
             at all frames and in all features: `simultaneous_factor` predicted standard deviations.
 
         Returns
@@ -482,8 +476,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         """A confidence band of the population's mean, at all frames and in all features.
 
         It holds that mean with probability ``coverage``, by a bootstrap over groups: the mean to
-        be expected if other people had been recorded, as many with as many performances. Of more
-        than 64 performances it is the band of those that are kept, which is wider.
+        be expected if other people had been recorded, as many with as many trials. Of more
+        than 64 trials it is the band of those that are kept, which is wider.
 
         The bootstrap takes the clock for exact. With a match the variance of a wrong clock is
         added: the squared slope of the mean times the squared standard error of the times.
@@ -493,7 +487,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         random_state : int, RandomState instance or None, default=0
             Draws the bootstrap samples.
         match : Match, default=None
-            Of the training performances, by the `DenseSynchronizer` that the model was fitted
+            Of the training trials, by the `DenseSynchronizer` that the model was fitted
             after.
 
         Returns
@@ -520,10 +514,10 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         return self.mean_ - half_width, self.mean_ + half_width
 
     def simultaneous_factor(self) -> float:
-        """How many predicted standard deviations the performances of new people stay within.
+        """How many predicted standard deviations the trials of new people stay within.
 
-        Whole performances, at all frames and in all features, with probability ``coverage``:
-        estimated from the largest deviation of each performance when its group is left out.
+        Whole trials, at all frames and in all features, with probability ``coverage``:
+        estimated from the largest deviation of each trial when its group is left out.
 
         Returns
         -------
@@ -538,12 +532,12 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     def sample(
         self, n: int = 1, frame: int | None = None, random_state: RandomState = None
     ) -> np.ndarray:
-        """Draw accepted postures at a frame (Fig. 4), or whole performances.
+        """Draw accepted poses at a frame (Fig. 4), or whole trials.
 
-        Both are drawn about those of training performances chosen at random, with mean, variance
+        Both are drawn about those of training trials chosen at random, with mean, variance
         and covariance of all, so that features keep their correlations and styles do not mix.
-        Postures are truncated at the envelope. Performances are accepted by `predict`; one that
-        would be rejected is moved towards its training performance. Features that are
+        Poses are truncated at the envelope. Trials are accepted by `predict`; one that
+        would be rejected is moved towards its training trial. Features that are
         directions, such as those of `DirectionCosines`, are mixed on the sphere and keep the
         length 1. Dimensions of an `ASpace` are no directions: there, limbs get their length
         from ``inverse_transform`` of the cosines.
@@ -553,18 +547,18 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         n : int, default=1
             Number of samples.
         frame : int, default=None
-            Frame of the model, 0 to P - 1; None for whole performances.
+            Frame of the model, 0 to P - 1; None for whole trials.
         random_state : int, RandomState instance or None, default=None
             Draws the samples.
 
         Returns
         -------
         ndarray, shape (n, n_features) or (n, P, n_features)
-            (n, P) for whole performances of a model fitted on 2-D input.
+            (n, P) for whole trials of a model fitted on 2-D input.
 
         See Also
         --------
-        blend_performances : Mixtures of one's own, in timing too.
+        blend_trials : Mixtures of one's own, in timing too.
         """
         self._check_groups_seen()
         if not isinstance(n, Integral) or n < 1:
@@ -573,13 +567,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         mean, variance, deviations = self.mean_, self.variance_, self.deviations_
         if frame is not None:
             k = self._check_frame(frame)
-            return sample_postures(
-                mean[k], variance[k], deviations[:, k], n, self.n_std, random_state
-            )
+            return sample_poses(mean[k], variance[k], deviations[:, k], n, self.n_std, random_state)
         dissimilarity, limit = self._neighbours.dissimilarity, self.threshold_
-        samples = sample_performances(
-            mean, variance, deviations, n, dissimilarity, limit, random_state
-        )
+        samples = sample_trials(mean, variance, deviations, n, dissimilarity, limit, random_state)
         return samples[:, :, 0] if self._fitted_on_rows else samples
 
     # -- helpers ------------------------------------------------------------------------------
@@ -590,9 +580,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         tags.input_tags.allow_nan = True
         return tags
 
-    def _learn(self, before, performances, groups):
-        """The attributes that are known after more performances than those of a stream."""
-        stream, codes, is_kept = before.extend(performances, groups)
+    def _learn(self, before, trials, groups):
+        """The attributes that are known after more trials than those of a stream."""
+        stream, codes, is_kept = before.extend(trials, groups)
         dtype, unseen = stream.kept.dtype, self._describe_unseen(stream)
         spread = float((stream.variance.mean(axis=0) + stream.mean.var(axis=0)).max().astype(dtype))
         learnt = {
@@ -617,7 +607,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             weights = learn_weights(fill_with_mean(training, stream.mean), stream.groups)
             neighbours = Neighbours(training, stream.groups, mean=stream.mean, weights=weights)
             compared_before = neighbours.dissimilarity(before.kept, before.groups)
-        dissimilarities = neighbours.dissimilarity(performances, codes)
+        dissimilarities = neighbours.dissimilarity(trials, codes)
         compared = np.concatenate([compared_before, dissimilarities])
         moments = stream.dropped + log_moments(compared)
         return learnt | {
@@ -630,15 +620,15 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         }
 
     def _judge(self, reference):
-        """What dissimilarities are to: the training performances, or those of a person."""
+        """What dissimilarities are to: the training trials, or those of a person."""
         if reference is None:
             return self._neighbours
-        of_person = np.stack(self.check_performances(reference)).astype(np.float64)
+        of_person = np.stack(self.check_trials(reference)).astype(np.float64)
         training, stream = self._stream.kept.astype(np.float64), self._stream
         return PersonalReference(training, stream.groups, stream.mean, of_person)
 
     def _describe_unseen(self, stream):
-        """A text about a value that the performances of fewer than two groups show; or none."""
+        """A text about a value that the trials of fewer than two groups show; or none."""
         if stream.counts is None or stream.n_groups < 2:
             return ""
         n_groups = (group_counts(stream.kept, stream.groups) > 0).sum(axis=0)
@@ -647,7 +637,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         frame, feature = np.argwhere(n_groups < 2)[0]
         names = names_of_input(self)
         name = "" if names is None else f" ({names[feature]!r})"
-        groups = "performance" if stream.n_groups == stream.n else "group"
+        groups = "trial" if stream.n_groups == stream.n else "group"
         return (
             f"Frame {frame}, feature {feature}{name} was seen in "
             f"{counted(int(n_groups[frame, feature]), groups)}, and at least 2 tell how it varies: "
@@ -662,14 +652,14 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         return int(frame)
 
     def _check_clock(self, X):
-        performances = _check_synchronised(super().check_performances(X))
-        if len(performances[0]) != self.n_frames_:
+        trials = _check_synchronised(super().check_trials(X))
+        if len(trials[0]) != self.n_frames_:
             raise ValueError(
-                f"The performances have {len(performances[0])} frames, the model "
+                f"The trials have {len(trials[0])} frames, the model "
                 f"{self.n_frames_}: synchronise them with the synchronizer that the model was "
                 "fitted after."
             )
-        return performances
+        return trials
 
     def _check_groups_seen(self):
         check_is_fitted(self, "mean_")
@@ -677,23 +667,23 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             raise NotFittedError(f"{self._unseen}. Give others to partial_fit.")
         if not hasattr(self, "threshold_"):
             raise NotFittedError(
-                "A model of how performances vary needs at least 2 performances, of different "
+                "A model of how trials vary needs at least 2 trials, of different "
                 f"groups; it has seen {self.n_samples_seen_}, of one group. Give others to "
                 "partial_fit, or no groups."
             )
 
 
-def _check_synchronised(performances):
-    """Refuse performances of several lengths, and those that show nothing."""
-    for i, x in enumerate(performances):
-        if len(x) != len(performances[0]):
+def _check_synchronised(trials):
+    """Refuse trials of several lengths, and those that show nothing."""
+    for i, x in enumerate(trials):
+        if len(x) != len(trials[0]):
             raise ValueError(
-                f"Performance {i} has {len(x)} frames, performance 0 has {len(performances[0])}: a "
-                "model needs synchronised performances. Put a DenseSynchronizer before it."
+                f"Trial {i} has {len(x)} frames, trial 0 has {len(trials[0])}: a "
+                "model needs synchronised trials. Put a DenseSynchronizer before it."
             )
         if is_gappy(x) and np.isnan(x).all():
             raise ValueError(
-                f"{performances.called(i)} is NaN in every frame and feature: nothing of it was "
-                "seen. Drop the performance."
+                f"{trials.called(i)} is NaN in every frame and feature: nothing of it was "
+                "seen. Drop the trial."
             )
-    return performances
+    return trials

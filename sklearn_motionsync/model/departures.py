@@ -1,4 +1,4 @@
-"""Departures of performances from a model: the table of what is wrong with them."""
+"""Departures of trials from a model: the table of what is wrong with them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from sklearn.base import BaseEstimator
 
 from ..body.limbs import part_of_limb
 from ..inputs.features import choose_features
-from ..inputs.types import Features, PerformancesLike
+from ..inputs.types import Features, TrialsLike
 from ..matching.counting import ROUNDING, first_largest, whole
 from ..matching.gaps import fill_with_mean
 from ..matching.warps import at_times
 from ..synchronizers.linear import LinearSynchronizer
 from ..utils.pipelines import find_synchronizer, route_to_synchronizer
-from .faults import FaultFinder, Part, expected_performance
+from .faults import FaultFinder, Part, expected_trial
 from .views import View, limbs_of, models_of_classes, view_of
 
 __all__ = ["Judged", "find_departures", "judge"]
@@ -31,7 +31,7 @@ _OUTSIDE, _HELD = 8, 0.95
 _CORRELATION_TIME = 0.1
 # Frames around a peak belong to it if they deviate by so much of it.
 _OF_PEAK = 0.5
-_COLUMNS = ["performance", "kind", "limb", "region", "feature", "first", "last", "peak"]
+_COLUMNS = ["trial", "kind", "limb", "region", "feature", "first", "last", "peak"]
 _COLUMNS += ["size", "unit", "deviation", "rare"]
 _DTYPES = {
     "first": np.intp, "last": np.intp, "peak": np.intp,
@@ -41,14 +41,14 @@ _DTYPES = {
 
 def find_departures(
     estimator: BaseEstimator,
-    X: PerformancesLike,
+    X: TrialsLike,
     *,
-    reference: PerformancesLike | None = None,
+    reference: TrialsLike | None = None,
     features: Features | None = None,
     limit: float | None = None,
     **params: Any,
 ) -> pd.DataFrame:
-    """What is wrong with performances: the limb, the kind of fault, when, and how large.
+    """What is wrong with trials: the limb, the kind of fault, when, and how large.
 
     A fault changes one limb, or one feature where there are no limbs: by an angle over a window of
     time, by a lag, or in its amplitude. The most important fault is that with the largest gain in
@@ -61,20 +61,20 @@ def find_departures(
     estimator : ActionModel, ActionClassifier, or Pipeline with one
         Fitted. With a classifier, the model is that of the class that is predicted before any
         rejection; these models are fitted by the call (`ActionClassifier.model_of`).
-    X : performances
+    X : trials
         As the estimator takes them.
-    reference : performances, default=None
-        One to five right performances of the same person, as the estimator takes them. What is
+    reference : trials, default=None
+        One to five right trials of the same person, as the estimator takes them. What is
         expected is then a weighted mean of theirs and of the model's: the posterior mean, with the
         variance within people, which is learnt from the groups of the model. They are synchronised
         without ``params``.
     features : int, str or list of them, default=None
-        Features of the model, or of the postures before its `ASpace`, by index or name: each is
+        Features of the model, or of the poses before its `ASpace`, by index or name: each is
         judged by itself. By default the limbs of `DirectionCosines`, if they lead to the model,
-        otherwise all features: those of postures before an `ASpace`, or of the model.
+        otherwise all features: those of poses before an `ASpace`, or of the model.
     limit : float, default=None
         Largest deviation that is no departure, in standard deviations. By default the evidence
-        decides: two in three correct performances of new people have a fault with as much. A fault
+        decides: two in three correct trials of new people have a fault with as much. A fault
         also counts that exceeds `ActionModel.simultaneous_factor`.
     **params : dict
         What synchronizing X takes besides, such as ``keyframes``.
@@ -82,9 +82,9 @@ def find_departures(
     Returns
     -------
     DataFrame
-        One row a fault, by performance and then the most important first:
+        One row a fault, by trial and then the most important first:
 
-        - ``performance``, its number or label, a tuple if an index has several levels; with a
+        - ``trial``, its number or label, a tuple if an index has several levels; with a
           classifier ``class``, the predicted one.
         - ``kind``: ``"angle"`` of a limb, ``"value"`` of a feature, ``"late"``, ``"early"``,
           ``"too small"`` or ``"too large"``, of the amplitude.
@@ -99,12 +99,12 @@ def find_departures(
           text.
         - ``deviation``, in standard deviations of people: negative below the mean, early, and too
           small.
-        - ``rare``: whether the evidence exceeds what a share of ``coverage`` of the performances of
+        - ``rare``: whether the evidence exceeds what a share of ``coverage`` of the trials of
           new people does in no limb and by no kind of fault. It is calibrated by leaving groups
-          out of the training set; with a reference, every performance of a person, the others
+          out of the training set; with a reference, every trial of a person, the others
           being the reference.
         - ``timing``, whether the clock may be the reason: inside the intervals of 90 % of its times
-          (`Match.interval`) the performance has values within the limit, or
+          (`Match.interval`) the trial has values within the limit, or
           ``n_std`` standard deviations. False where no `DenseSynchronizer` tells.
 
     Raises
@@ -131,8 +131,8 @@ def find_departures(
     >>> new = np.sin(3 * t)
     >>> new[20:25] += 3
     >>> found = find_departures(model, [np.sin(3 * t), new])
-    >>> found[["performance", "kind", "first", "last", "size", "deviation", "rare"]].round(0)
-       performance   kind  first  last  size  deviation  rare
+    >>> found[["trial", "kind", "first", "last", "size", "deviation", "rare"]].round(0)
+       trial   kind  first  last  size  deviation  rare
     0            1  value     20    24   3.0       19.0  True
     """
     is_number = isinstance(limit, Real) and not isinstance(limit, bool)
@@ -146,7 +146,7 @@ def find_departures(
     if models is None:
         return table_of(estimator, X, params)
     # Params are those of the steps before a classifier; its models take none.
-    tables = [table_of(each.estimator, each.performances, {}, part=each) for each in models]
+    tables = [table_of(each.estimator, each.trials, {}, part=each) for each in models]
     order = np.concatenate(
         [each.indices[t.pop("index")] for each, t in zip(models, tables, strict=True)]
     )
@@ -162,11 +162,11 @@ def _departures(estimator, X, params, caller, features, limit, reference, part=N
     labels = view.labels if part is None else part.labels
     table = pd.DataFrame(rows, columns=_COLUMNS, dtype=object).astype(_DTYPES)
     # A label may be a tuple, which an array would unpack.
-    table["performance"] = pd.Series([labels[row.performance] for row in rows], dtype=object)
+    table["trial"] = pd.Series([labels[row.trial] for row in rows], dtype=object)
     table["feature"] = pd.Series([space.names[row.feature] for row in rows], dtype=object)
     if part is not None:
         table.insert(1, "class", np.full(len(rows), part.label, dtype=object))
-        table.insert(2, "index", np.array([row.performance for row in rows], dtype=np.intp))
+        table.insert(2, "index", np.array([row.trial for row in rows], dtype=np.intp))
     if space.limbs is None:
         table = table.drop(columns=["limb", "region"])
     table["timing"] = np.zeros(len(rows), dtype=bool)
@@ -180,7 +180,7 @@ def _departures(estimator, X, params, caller, features, limit, reference, part=N
 class Departure(NamedTuple):
     """A row of the table; ``feature`` is an index."""
 
-    performance: int
+    trial: int
     kind: str
     limb: str | None
     region: str | None
@@ -195,14 +195,14 @@ class Departure(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """Performances beside what is expected of them.
+    """Trials beside what is expected of them.
 
     Attributes
     ----------
     view : View
     space : FaultSpace
     curves : ndarray (n, P, n_features)
-        The performances on the clock, in the features of ``space.names``; NaN in gaps.
+        The trials on the clock, in the features of ``space.names``; NaN in gaps.
     mean, std : ndarray (P, n_features)
         What is expected of them.
     scores : ndarray (n, P, n_features)
@@ -228,7 +228,7 @@ class Judged(NamedTuple):
     match: object
 
     def rows(self, i, limit):
-        """The rows of a performance, the most important first.
+        """The rows of a trial, the most important first.
 
         Those beyond a limit of the deviation. If it is None, those with more evidence than usual,
         and those that are far away: a body that is wrong altogether has no limb that is.
@@ -278,7 +278,7 @@ class Judged(NamedTuple):
 
 
 def judge(estimator, X, params, caller, *, features=None, reference=None, only=None):
-    """Performances of an estimator beside what is expected of them, and their faults.
+    """Trials of an estimator beside what is expected of them, and their faults.
 
     Parameters
     ----------
@@ -286,18 +286,18 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
         As for `view_of`.
     features : int, str or list of them, default=None
         Those that are judged, each by itself; by default limbs, or all.
-    reference : performances, default=None
+    reference : trials, default=None
         Right ones of the person.
     only : callable, default=None
-        Gives the index of the performance whose faults are sought, of their number; by default
+        Gives the index of the trial whose faults are sought, of their number; by default
         those of all are.
 
     Returns
     -------
     Judged
     """
-    postures = features is None
-    view = view_of(estimator, X, params, caller, features=features, postures=postures)
+    poses = features is None
+    view = view_of(estimator, X, params, caller, features=features, poses=poses)
     n = len(view.labels)
     sought = range(n) if only is None else [only(n)]
     names, chosen = view.names, np.arange(len(view.names))
@@ -314,11 +314,9 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     training, groups = view.training[..., chosen].astype(np.float64), view.model.groups_
     mean, std, of_person = view.model.mean_[:, chosen], view.predicted[:, chosen], None
     if reference is not None:
-        reference_view = view_of(
-            estimator, reference, {}, caller, features=features, postures=postures
-        )
+        reference_view = view_of(estimator, reference, {}, caller, features=features, poses=poses)
         of_person = fill_with_mean(reference_view.whole[..., chosen].astype(np.float64), mean)
-        mean, variance = expected_performance(training, groups, of_person)
+        mean, variance = expected_trial(training, groups, of_person)
         std = np.sqrt(variance + view.residual_variance[chosen] * (1 + 1 / len(of_person)))
     curves, left_out = view.whole[..., chosen], view.residual_variance[chosen]
     filled = fill_with_mean(curves.astype(np.float64), mean)
@@ -333,8 +331,8 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
         if not len(examples) == len(whose) == view.model_of_points.n_samples_seen_:
             whose = np.arange(len(examples))
 
-        def to_space(performances):
-            return space.convert(performances)[..., :width]
+        def to_space(trials):
+            return space.convert(trials)[..., :width]
 
         of_reference = None
         if of_person is not None:
@@ -385,53 +383,53 @@ class FaultSpace:
         self._others, n_cosines = remaining, len(names) - len(remaining)
         self.parts += [Part(names[k], [n_cosines + j], [k], None) for j, k in enumerate(remaining)]
 
-    def convert(self, performances):
-        """Performances (n, P, n_features) of the view, without gaps: (n, P, n_columns)."""
+    def convert(self, trials):
+        """Trials (n, P, n_features) of the view, without gaps: (n, P, n_columns)."""
         if self.limbs is None:
-            return performances
-        cosines = self.limbs.in_parent_axes(performances)
-        return np.concatenate([cosines, performances[..., self._others]], axis=2)
+            return trials
+        cosines = self.limbs.in_parent_axes(trials)
+        return np.concatenate([cosines, trials[..., self._others]], axis=2)
 
     def outside(self, known):
         """A floor of the variance of limbs, of each column.
 
         It is eight times the variance outside of the components that hold 95 % of that of the known
-        performances (n, P, n_columns): new people do what none of these did.
+        trials (n, P, n_columns): new people do what none of these did.
         """
         floor = np.zeros(known.shape[2])
         if self.limbs is not None:
             n_cosines = known.shape[2] - len(self._others)
-            postures = known[..., :n_cosines].reshape(-1, n_cosines)
-            values, vectors = np.linalg.eigh(np.cov(postures, rowvar=False))
+            poses = known[..., :n_cosines].reshape(-1, n_cosines)
+            values, vectors = np.linalg.eigh(np.cov(poses, rowvar=False))
             left_out = np.cumsum(values) <= (1 - _HELD) * values.sum()
             squares = np.square(vectors[:, left_out]) @ np.maximum(values[left_out], 0)
             floor[:n_cosines] = _OUTSIDE * squares
         return floor
 
 
-def with_residuals(performances, groups, variance):
-    """Performances in an aSpace with residuals in place of those that it took.
+def with_residuals(trials, groups, variance):
+    """Trials in an aSpace with residuals in place of those that it took.
 
     They are drawn, always the same ones: half of their variance is an offset of a group, the other
     half changes within a tenth of the clock.
 
     Parameters
     ----------
-    performances : ndarray (n, P, n_features)
+    trials : ndarray (n, P, n_features)
     groups : ndarray of int (n,)
     variance : ndarray (n_features,)
         Of the residuals; all 0 without an aSpace.
     """
     if not variance.any():
-        return performances
-    n, n_frames, width = performances.shape
+        return trials
+    n, n_frames, width = trials.shape
     codes = np.unique(groups, return_inverse=True)[1].ravel()
     rng, t = np.random.default_rng(0), np.linspace(0, 1, n_frames)
     offsets = rng.standard_normal((codes.max() + 1, 1, width))[codes]
     kernel = np.exp(-0.5 * np.square((t[:, np.newaxis] - t) / _CORRELATION_TIME))
     factor = np.linalg.cholesky(kernel + 1e-6 * np.eye(n_frames))
     courses = factor @ rng.standard_normal((n, n_frames, width))
-    return performances + np.sqrt(variance / 2) * (offsets + courses)
+    return trials + np.sqrt(variance / 2) * (offsets + courses)
 
 
 def around_peak(scores, peak):
@@ -448,10 +446,10 @@ def around_peak(scores, peak):
     return first + int(seen[0]), first + int(seen[-1])
 
 
-def unwarped(performances, times):
-    """Performances (n, P, n_features) on the clock, in linear time, by their times (n, P)."""
-    frames = np.arange(performances.shape[1])
-    pairs = zip(performances, times, strict=True)
+def unwarped(trials, times):
+    """Trials (n, P, n_features) on the clock, in linear time, by their times (n, P)."""
+    frames = np.arange(trials.shape[1])
+    pairs = zip(trials, times, strict=True)
     return np.stack([at_times(x, np.interp(frames, of_one, frames)) for x, of_one in pairs])
 
 
@@ -466,17 +464,17 @@ def explained_by_timing(rows, curves, lower, upper, match):
     """Whether a wrong clock may be the reason of departures, (n_rows,).
 
     The time of every frame of one may then be another one inside its interval, where the
-    performance has values between the bounds.
+    trial has values between the bounds.
 
     Parameters
     ----------
     rows : list of Departure
     curves : ndarray, shape (n, P, n_features)
-        Performances on the clock.
+        Trials on the clock.
     lower, upper : ndarray, shape (P, n_features)
         Bounds of what is no departure.
     match : Match
-        Of the performances.
+        Of the trials.
     """
     n_frames, pairs = curves.shape[1], zip(match.times, *match.interval(), strict=True)
     # The frames of the clock whose times are inside the interval of a frame.
@@ -484,7 +482,7 @@ def explained_by_timing(rows, curves, lower, upper, match):
     frames, explained = np.arange(n_frames), np.empty(len(rows), dtype=bool)
     starts, ends = np.minimum(spans[:, 0], frames), np.maximum(spans[:, 1], frames + 1)
     for k, row in enumerate(rows):
-        i, feature = row.performance, row.feature
+        i, feature = row.trial, row.feature
         curve, run = curves[i, :, feature], frames[row.first : row.last + 1]
         # A fault may last over a gap, in which nothing was seen.
         run = run[~np.isnan(curve[run])]

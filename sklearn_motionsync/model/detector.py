@@ -1,4 +1,4 @@
-"""ActionDetector: whether performances as they were recorded are the action, and why not."""
+"""ActionDetector: whether trials as they were recorded are the action, and why not."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..body.limbs import PARTS, names_of_cosines
 from ..body.mirror import exchange_of_sides
 from ..inputs.tables import index_of
-from ..inputs.types import Labels, PerformancesLike
+from ..inputs.types import Labels, TrialsLike
 from ..inputs.validation import labels_of_input
 from ..matching.counting import first_largest
 from ..matching.gaps import fill_with_mean, is_gappy
@@ -35,12 +35,12 @@ from ..utils.pipelines import (
 )
 from .acceptance import Acceptance, Contrast, LogPredictionInterval, dissimilarity_tails
 from .action_model import ActionModel
-from .similarity import PerformanceStream, PersonalReference, movement_energies
+from .similarity import PersonalReference, TrialStream, movement_energies
 from .views import curves_of
 
 __all__ = ["ActionDetector"]
 
-# Reasons for the rejection of a performance below, or above, the accepted interval.
+# Reasons for the rejection of a trial below, or above, the accepted interval.
 _REASONS = {
     "movement": (None, "another movement"),
     "own": (None, "unlike the reference"),
@@ -83,10 +83,10 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         Ends in an `ActionModel`, with a synchronizer before it. The features that the synchronizer
         gets are compared. It is cloned, not changed.
     coverage : float, default=0.95
-        Share of performances of new people that ``predict`` is to accept, between 0 and 1.
+        Share of trials of new people that ``predict`` is to accept, between 0 and 1.
         It replaces the coverage of the model.
     duration : bool, default=True
-        Whether the number of frames counts. Frames are time only if all performances have one
+        Whether the number of frames counts. Frames are time only if all trials have one
         frame rate, in ``fit`` and after it, and are cut where the action begins and ends: else
         give False, or resample them to one rate.
     sides : bool or "auto", default="auto"
@@ -186,19 +186,19 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
 
     @validated_with_nested
     def fit(
-        self, X: PerformancesLike, y: object = None, groups: Labels | None = None, **params: Any
+        self, X: TrialsLike, y: object = None, groups: Labels | None = None, **params: Any
     ) -> Self:
         """Fit the pipeline, and estimate the acceptance regions.
 
         Parameters
         ----------
-        X : performances
+        X : trials
             As the pipeline takes them.
         y : array-like, default=None
             Passed to the pipeline; ignored by the detector.
         groups : array-like, shape (n_sequences,), default=None
-            The subject of each performance, or what else makes performances resemble each other.
-            The model of the pipeline gets them, too. By default every performance is a group of
+            The subject of each trial, or what else makes trials resemble each other.
+            The model of the pipeline gets them, too. By default every trial is a group of
             its own.
         **params : dict
             What the ``fit`` of the pipeline takes besides: by the names of steps, or routed
@@ -248,17 +248,17 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         return self.estimator_.feature_names_in_
 
     def predict(
-        self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
+        self, X: TrialsLike, reference: TrialsLike | None = None, **params: Any
     ) -> np.ndarray:
-        """Whether performances are the action.
+        """Whether trials are the action.
 
         Parameters
         ----------
-        X : performances
+        X : trials
             As the pipeline takes them.
-        reference : performances, as the pipeline takes them, default=None
+        reference : trials, as the pipeline takes them, default=None
             Good ones of the person that X is of, two to five. It needs training groups with several
-            performances.
+            trials.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
@@ -271,72 +271,72 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         return np.where(scores <= 1, 1, -1)
 
     def decision_function(
-        self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
+        self, X: TrialsLike, reference: TrialsLike | None = None, **params: Any
     ) -> np.ndarray:
-        """Distance of the score of performances from its limit.
+        """Distance of the score of trials from its limit.
 
         Parameters
         ----------
-        X : performances
+        X : trials
             As the pipeline takes them.
-        reference : performances, as the pipeline takes them, default=None
+        reference : trials, as the pipeline takes them, default=None
             Good ones of the person that X is of, two to five. It needs training groups with several
-            performances.
+            trials.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            ``score_samples`` less ``offset_``: negative for performances that are rejected.
+            ``score_samples`` less ``offset_``: negative for trials that are rejected.
         """
         return 1 - self._judge(X, reference, params, "decision_function")["score"].to_numpy()
 
     def score_samples(
-        self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
+        self, X: TrialsLike, reference: TrialsLike | None = None, **params: Any
     ) -> np.ndarray:
-        """The score of performances in units of its limit, negated.
+        """The score of trials in units of its limit, negated.
 
         Parameters
         ----------
-        X : performances
+        X : trials
             As the pipeline takes them.
-        reference : performances, as the pipeline takes them, default=None
+        reference : trials, as the pipeline takes them, default=None
             Good ones of the person that X is of, two to five. It needs training groups with several
-            performances.
+            trials.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            At least ``offset_`` for performances that are accepted.
+            At least ``offset_`` for trials that are accepted.
         """
         return -self._judge(X, reference, params, "score_samples")["score"].to_numpy()
 
     def report(
-        self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
+        self, X: TrialsLike, reference: TrialsLike | None = None, **params: Any
     ) -> pd.DataFrame:
-        """The test statistics of performances, and the reason for a rejection.
+        """The test statistics of trials, and the reason for a rejection.
 
         Parameters
         ----------
-        X : performances
+        X : trials
             As the pipeline takes them.
-        reference : performances, as the pipeline takes them, default=None
+        reference : trials, as the pipeline takes them, default=None
             Good ones of the person that X is of, two to five. It needs training groups with several
-            performances.
+            trials.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
-        DataFrame, one row a performance
+        DataFrame, one row a trial
             ``movement``, ``own`` (with a reference), ``course``, and the contrasts that count,
             ``mirror``, ``arms`` and ``reversal``, in units of their limit: up to 1 is usual.
             ``duration`` (if it counts) and ``energy``: 0 is the mean, -1 to 1 usual, below are
             those that are too short or too weak. ``score``: up to 1 is accepted. ``reason`` of a
-            rejection, such as "too long, too weak"; empty if the performance is accepted.
+            rejection, such as "too long, too weak"; empty if the trial is accepted.
         """
         return self._judge(X, reference, params, "report")
 
@@ -362,18 +362,18 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         return tags
 
     def _learn(self, pipeline, X, params, groups):
-        """All tests, by the training performances of a fitted pipeline."""
+        """All tests, by the training trials of a fitted pipeline."""
         caller = "ActionDetector.fit"
         reached = route_to_synchronizer(pipeline, X, params, caller)
-        performances, synchronizer = reached.performances, reached.synchronizer
-        codes, _ = encode_groups(groups, len(performances), at_least=2)
+        trials, synchronizer = reached.trials, reached.synchronizer
+        codes, _ = encode_groups(groups, len(trials), at_least=2)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)
         curves = curves_of(pipeline, X, params, caller)
         columns = _seen_columns(curves.whole, codes)
-        whole, on_clock = curves.whole[..., columns], synchronizer.normalize(performances)
+        whole, on_clock = curves.whole[..., columns], synchronizer.normalize(trials)
         aligned = ActionModel(coverage=coverage).fit(whole, groups=codes)
         unaligned = ActionModel(coverage=coverage).fit(on_clock, groups=codes)
-        measures = {"duration": _durations(performances)} if self.duration else {}
+        measures = {"duration": _durations(trials)} if self.duration else {}
         measures["energy"], energy_floor = movement_energies(on_clock)
         intervals = {
             name: LogPredictionInterval(values, codes, coverage)
@@ -386,7 +386,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         for name, interval in intervals.items():
             tails[name] = interval.tails(interval.deviations)
         names = [curves.names[k] for k in columns]
-        stream, _, is_kept = PerformanceStream.starting_at(whole[0]).extend(whole, codes)
+        stream, _, is_kept = TrialStream.starting_at(whole[0]).extend(whole, codes)
         return _Tests(
             columns,
             aligned,
@@ -438,8 +438,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         except MissingMetadata as error:
             reason, name, _ = error.args
             raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error
-        performances = reached.performances
-        on_clock = reached.synchronizer.normalize(performances)
+        trials = reached.trials
+        on_clock = reached.synchronizer.normalize(trials)
         statistics, tails, acceptance = {}, {}, tests.acceptance
 
         def compare(name, dissimilarity, held_out, limit):
@@ -461,7 +461,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         model = tests.unaligned
         compare("course", model.dissimilarity(on_clock), model.dissimilarities_, model.threshold_)
         measures = {
-            "duration": _durations(performances),
+            "duration": _durations(trials),
             "energy": movement_energies(on_clock, tests.energy_floor)[0],
         }
         for name, interval in tests.intervals.items():
@@ -481,7 +481,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             statistics[name] = contrast.standardize(filled)
             # More like the image than like the action.
             far = np.maximum(far, statistics[name])
-        labels, levels = labels_of_input(X, performances)
+        labels, levels = labels_of_input(X, trials)
         table = pd.DataFrame(statistics, index=index_of(labels, levels[:-1]))
         table["score"] = np.where(far > 1, np.maximum(scores, far), scores)
         # What no test alone explains is that which adds most to the score.
@@ -513,14 +513,14 @@ def _check_steps(pipeline):
 
 
 class _Tests(NamedTuple):
-    """What is learnt of training performances, for the tests of others.
+    """What is learnt of training trials, for the tests of others.
 
     Attributes
     ----------
     columns : ndarray of int
         The features that are compared.
     aligned, unaligned : ActionModel
-        Of performances after alignment, and after linear normalisation alone.
+        Of trials after alignment, and after linear normalisation alone.
     intervals : dict of str to LogPredictionInterval
         Of durations, if they count, and energies.
     energy_floor : float
@@ -528,7 +528,7 @@ class _Tests(NamedTuple):
     acceptance : Acceptance
     contrasts : dict of str to Contrast
         To the images that count.
-    stream : PerformanceStream
+    stream : TrialStream
         Those that a reference is judged by, at most 64.
     kept_tails : dict of str to ndarray (n_kept,)
         Their log-probabilities in each test.
@@ -541,16 +541,16 @@ class _Tests(NamedTuple):
     energy_floor: float
     acceptance: Acceptance
     contrasts: dict
-    stream: PerformanceStream
+    stream: TrialStream
     kept_tails: dict
 
 
-def _reversed(performances):
-    return performances[:, ::-1]
+def _reversed(trials):
+    return trials[:, ::-1]
 
 
-def _exchanged(columns, signs, performances):
-    return signs * performances[..., columns]
+def _exchanged(columns, signs, trials):
+    return signs * trials[..., columns]
 
 
 def _seen_columns(whole, codes):
@@ -561,12 +561,12 @@ def _seen_columns(whole, codes):
     return np.flatnonzero(n_groups.min(axis=0) > 1)
 
 
-def _durations(performances):
-    return np.array([len(x) for x in performances], dtype=np.float64)
+def _durations(trials):
+    return np.array([len(x) for x in trials], dtype=np.float64)
 
 
 def _reason(statistics, most):
-    """The reason for the rejection of a performance: the tests beyond their limits, or that one."""
+    """The reason for the rejection of a trial: the tests beyond their limits, or that one."""
     sizes = {k: abs(v) if k in _TWO_SIDED else v for k, v in statistics.items()}
     beyond = [name for name, size in sizes.items() if size > 1]
     beyond = beyond or [most]

@@ -1,9 +1,9 @@
-"""What is wrong with a performance: the part of it, the kind of fault, when, and how large.
+"""What is wrong with a trial: the part of it, the kind of fault, when, and how large.
 
 A fault changes one part, such as a limb: by a constant over a window of time, by a lag, or in its
 amplitude. The evidence is twice the gain in the log likelihood of the deviations from what is
 expected, which are normal, with a covariance over time and one between features. Both are those of
-training performances from the expectation by other people.
+training trials from the expectation by other people.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from ..matching.warps import at_times
 from .acceptance import t_prediction_limit
 from .variation import predictive_variance, within_variance
 
-__all__ = ["Expectation", "FaultFinder", "FoundFault", "Part", "expected_performance"]
+__all__ = ["Expectation", "FaultFinder", "FoundFault", "Part", "expected_trial"]
 
 # All was chosen on HDM05 and two exercises of UI-PRMD (benchmarks/departures.py).
 # Frames of the clock on which faults are sought, at most.
@@ -41,26 +41,26 @@ _LEAST_BETWEEN = 0.05
 _PRIOR_COUNT = 2
 # A fault is a lag, or of amplitude, if this explains so much of what a window explains.
 _LAG_EXPLAINS, _RATIO_EXPLAINS = 0.4, 0.5
-# Evidence is listed from this share of the median of right performances on: then 72 % of
+# Evidence is listed from this share of the median of right trials on: then 72 % of
 # faults in three classes of HDM05 have their region in the first row, with 1 it is 59 %; of right
-# performances 72 % have a row, with 1 it is 39 %.
+# trials 72 % have a row, with 1 it is 39 %.
 _HINT = 0.75
 # Prior variance of the logarithm of the largest score, as in `simultaneous_factor`.
 _PRIOR_VARIANCE, _BELOW_MEDIAN = 0.1, 1.0
 # Lags and log ratios of people vary by so much at least: frames, and in the logarithm.
 _LEAST_LAG, _LEAST_RATIO = 1.0, 0.05
-# Most faults of a performance, and most that are taken away to find them.
+# Most faults of a trial, and most that are taken away to find them.
 _MOST_FAULTS, _MOST_STEPS = 5, 12
 
 
 class Part(NamedTuple):
-    """A part of a performance: a limb, or a feature.
+    """A part of a trial: a limb, or a feature.
 
     Attributes
     ----------
     name : str
     columns : list of int
-        Its columns in the performances in which faults are sought.
+        Its columns in the trials in which faults are sought.
     features : list of int
         Its features in the view.
     region : str or None
@@ -74,7 +74,7 @@ class Part(NamedTuple):
 
 
 class FoundFault(NamedTuple):
-    """A fault of a performance.
+    """A fault of a trial.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class FoundFault(NamedTuple):
     deviation : float
         Of lags and ratios, in standard deviations of people; NaN of others.
     score : float
-        Square root of the gain, relative to that of right performances: of the part where the
+        Square root of the gain, relative to that of right trials: of the part where the
         others are known, of the part alone, or of a body that hardly moves, the largest.
     """
 
@@ -101,18 +101,18 @@ class FoundFault(NamedTuple):
     score: float
 
 
-def expected_performance(performances, groups, reference=None):
-    """Mean and variance of a new performance.
+def expected_trial(trials, groups, reference=None):
+    """Mean and variance of a new trial.
 
-    Of a new person they are the mean of the performances and `predictive_variance`, v. With n
-    reference performances of the person, the mean is that of the posterior distribution:
+    Of a new person they are the mean of the trials and `predictive_variance`, v. With n
+    reference trials of the person, the mean is that of the posterior distribution:
     ``m + k (r - m)`` with ``k = b / (b + w / n)``, where r is the mean of the reference, w is the
     variance within people and ``b = v - w`` that between them. The variance is ``w (1 + k / n)``.
     If the reference varies more than that of other people, w is raised, feature by feature.
 
     Parameters
     ----------
-    performances : ndarray, shape (n, P, n_features)
+    trials : ndarray, shape (n, P, n_features)
     groups : ndarray of int, shape (n,)
     reference : ndarray, shape (n_reference, P, n_features), default=None
 
@@ -120,12 +120,12 @@ def expected_performance(performances, groups, reference=None):
     -------
     mean, variance : ndarray, shape (P, n_features)
     """
-    mean, variance = performances.mean(axis=0), predictive_variance(performances, groups)
+    mean, variance = trials.mean(axis=0), predictive_variance(trials, groups)
     if reference is None:
         return mean, variance
-    within, n = within_variance(performances, groups), len(reference)
+    within, n = within_variance(trials, groups), len(reference)
     if n > 1:
-        # A person whose own performances differ more than those of others do.
+        # A person whose own trials differ more than those of others do.
         ratio = reference.var(axis=0, ddof=1).mean(axis=0) / within.mean(axis=0)
         within = within * np.maximum((_PRIOR_COUNT + (n - 1) * ratio) / (_PRIOR_COUNT + n - 1), 1)
     between = np.maximum(variance - within, _LEAST_BETWEEN * within)
@@ -134,7 +134,7 @@ def expected_performance(performances, groups, reference=None):
 
 
 class Expectation:
-    """What is expected of a performance, and the gain of every fault of one that differs.
+    """What is expected of a trial, and the gain of every fault of one that differs.
 
     Parameters
     ----------
@@ -240,37 +240,37 @@ class Expectation:
 
 
 class FaultFinder:
-    """Finds the faults of performances on the clock of a model.
+    """Finds the faults of trials on the clock of a model.
 
     Parameters
     ----------
-    performances : ndarray (n, P, n_columns)
+    trials : ndarray (n, P, n_columns)
         Right ones on the clock, without gaps.
     groups : ndarray of int (n,)
     parts : list of Part
     reference : ndarray (n_reference, P, n_columns), default=None
         Right ones of the person.
     coverage : float, default=0.95
-        The share of performances of new people without a rare fault.
+        The share of trials of new people without a rare fault.
     floor : ndarray (n_columns,), default=0
         Variance that is added to that of all.
     linear : tuple of ndarray, default=None
-        Performances in linear time, their groups, and the reference in it, or None: for lags.
+        Trials in linear time, their groups, and the reference in it, or None: for lags.
     """
 
     def __init__(
-        self, performances, groups, parts, reference=None, *, coverage=0.95, floor=0.0,
+        self, trials, groups, parts, reference=None, *, coverage=0.95, floor=0.0,
         linear=None,
     ):  # fmt: skip
         self.parts = parts
-        n_frames = min(performances.shape[1], _MOST_FRAMES)
-        self._n_frames, self._last = n_frames, performances.shape[1] - 1
+        n_frames = min(trials.shape[1], _MOST_FRAMES)
+        self._n_frames, self._last = n_frames, trials.shape[1] - 1
         self._windows, self._spans = windows_of(n_frames)
         largest = int(_LARGEST_LAG * n_frames)
         self._lags = np.array([lag for lag in range(-largest, largest + 1) if lag])
         coarse_reference = None if reference is None else self._coarse(reference)
         self._clock = _Learnt(
-            self._coarse(performances), groups, coarse_reference, parts, floor, self._lags
+            self._coarse(trials), groups, coarse_reference, parts, floor, self._lags
         )
         self._linear = None
         if linear is not None:
@@ -280,7 +280,7 @@ class FaultFinder:
             columns = in_time.shape[2]
             known_parts = [part for part in parts if max(part.columns) < columns]
             self._known = np.array([k for k, part in enumerate(parts) if part in known_parts])
-            floor = np.broadcast_to(floor, performances.shape[2:])[:columns]
+            floor = np.broadcast_to(floor, trials.shape[2:])[:columns]
             self._linear = _Learnt(
                 self._coarse(in_time),
                 groups_in_time,
@@ -293,12 +293,12 @@ class FaultFinder:
         self._expected = self._clock.expectation(self._windows)
         self._calibrate(coverage)
 
-    def find(self, performance, in_linear_time=None):
-        """The faults of a performance (P, n_columns), the most important first.
+    def find(self, trial, in_linear_time=None):
+        """The faults of a trial (P, n_columns), the most important first.
 
         Parameters
         ----------
-        performance : ndarray (P, n_columns)
+        trial : ndarray (P, n_columns)
             On the clock, without gaps.
         in_linear_time : ndarray (P, n_columns), default=None
             The same linearly normalised.
@@ -307,7 +307,7 @@ class FaultFinder:
         -------
         list of FoundFault
         """
-        deviations = self._coarse(performance[np.newaxis])[0] - self._expected.mean
+        deviations = self._coarse(trial[np.newaxis])[0] - self._expected.mean
         later = None
         if self._linear is not None:
             later = self._coarse(in_linear_time[np.newaxis])[0] - self._late.mean
@@ -415,7 +415,7 @@ class FaultFinder:
         codes = np.array([group for *_, group in self._clock.indices])
         logs = 0.5 * np.log((gains / self._usual[:, np.newaxis]).max(axis=0))
         logs = np.maximum(logs, np.median(logs) - _BELOW_MEDIAN)
-        # A new performance is one of a new group.
+        # A new trial is one of a new group.
         of_groups = [logs[codes == group] for group in np.unique(codes)]
         means = np.array([x.mean() for x in of_groups])
         within = np.mean([x.var(ddof=1) * (1 - 1 / len(x)) if len(x) > 1 else 0 for x in of_groups])
@@ -426,13 +426,13 @@ class FaultFinder:
         self._lag_spread = _spread(np.array(lags), _LEAST_LAG)
         self._ratio_spread = _spread(np.log(np.maximum(ratios, 0.01)), _LEAST_RATIO)
 
-    def _coarse(self, performances):
-        """Performances at the frames on which faults are sought."""
-        n_frames = performances.shape[1]
+    def _coarse(self, trials):
+        """Trials at the frames on which faults are sought."""
+        n_frames = trials.shape[1]
         if n_frames == self._n_frames:
-            return performances.astype(np.float64)
+            return trials.astype(np.float64)
         times = np.linspace(0, n_frames - 1, self._n_frames)
-        return np.array([at_times(x, times) for x in performances])
+        return np.array([at_times(x, times) for x in trials])
 
 
 class _Evidence(NamedTuple):
@@ -453,17 +453,17 @@ class _Evidence(NamedTuple):
 
 
 class _Learnt:
-    """What is expected of a new performance, and of those of each group by the other groups."""
+    """What is expected of a new trial, and of those of each group by the other groups."""
 
-    def __init__(self, performances, groups, reference, parts, floor, lags):
-        self._performances, self._parts, self._lags = performances, parts, lags
+    def __init__(self, trials, groups, reference, parts, floor, lags):
+        self._trials, self._parts, self._lags = trials, parts, lags
         codes = np.unique(groups, return_inverse=True)[1].ravel()
         n_reference = 0 if reference is None else len(reference)
         if n_reference and np.bincount(codes).max() < 2:
-            # No group tells how a person varies about the own performances.
+            # No group tells how a person varies about the own trials.
             n_reference = 0
         self._expected, self.indices = {}, []
-        for i in range(len(performances)):
+        for i in range(len(trials)):
             same_group = np.flatnonzero(codes == codes[i])
             same_group = same_group[same_group != i][:n_reference]
             if n_reference and not len(same_group):
@@ -473,24 +473,22 @@ class _Learnt:
                 is_other[:] = True
             key = (codes[i], i) if n_reference else codes[i]
             if key not in self._expected:
-                of_group = performances[same_group] if n_reference else None
-                mean, variance = expected_performance(
-                    performances[is_other], codes[is_other], of_group
-                )
+                of_group = trials[same_group] if n_reference else None
+                mean, variance = expected_trial(trials[is_other], codes[is_other], of_group)
                 self._expected[key] = mean, self._raised(variance, floor)
             self.indices.append((i, key, codes[i]))
-        deviations = [performances[i] - self._expected[key][0] for i, key, _ in self.indices]
+        deviations = [trials[i] - self._expected[key][0] for i, key, _ in self.indices]
         scales = [1 / np.sqrt(self._expected[key][1]) for _, key, _ in self.indices]
         self._scores = np.array(deviations) * np.array(scales)
-        mean, variance = expected_performance(performances, codes, reference)
+        mean, variance = expected_trial(trials, codes, reference)
         self._moments = mean, self._raised(variance, floor)
 
     def expectation(self, windows):
-        """What is expected of a new performance."""
+        """What is expected of a new trial."""
         return self._expectation(self._moments, precisions(self._scores), windows)
 
     def left_out(self, windows):
-        """Each performance that was left out: index, expectation by others, and deviations."""
+        """Each trial that was left out: index, expectation by others, and deviations."""
         inverses, before = {}, None
         for i, key, group in self.indices:
             if group not in inverses:
@@ -501,7 +499,7 @@ class _Learnt:
             if key != before:
                 expectation = self._expectation(self._expected[key], inverses[group], windows)
                 before = key
-            yield i, expectation, self._performances[i] - expectation.mean
+            yield i, expectation, self._trials[i] - expectation.mean
 
     def _expectation(self, moments, inverses, windows):
         (mean, variance), (over_time, between) = moments, inverses

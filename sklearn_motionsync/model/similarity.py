@@ -1,4 +1,4 @@
-"""Dissimilarity of performances to training performances, and which of these are kept."""
+"""Dissimilarity of trials to training trials, and which of these are kept."""
 
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -15,8 +15,8 @@ from .variation import within_variance
 
 __all__ = [
     "Neighbours",
-    "PerformanceStream",
     "PersonalReference",
+    "TrialStream",
     "Weights",
     "distances_by_differences",
     "learn_weights",
@@ -25,11 +25,11 @@ __all__ = [
 
 # A dissimilarity is the mean over so many nearest neighbours: a single one may be an outlier.
 _N_NEAREST, _N_NEAREST_LEARNT = 2, 3
-# Weight of the mean posture: people stand differently, but an action elsewhere is another action.
+# Weight of the mean pose: people stand differently, but an action elsewhere is another action.
 # Where it is learnt it is at most this.
 _MEAN_WEIGHT = 0.1
-# The share of a typical dissimilarity that mean postures make: of people among each other, and of
-# the performances of a person, whose mean posture tells more.
+# The share of a typical dissimilarity that mean poses make: of people among each other, and of
+# the trials of a person, whose mean pose tells more.
 _MEAN_SHARE, _OWN_MEAN_SHARE = 0.05, 0.2
 # The least variance of a feature that is weighted, as a share of the largest.
 _LEAST_VARIANCE = 0.01
@@ -37,10 +37,10 @@ _LEAST_VARIANCE = 0.01
 _VELOCITY_SMOOTHING = 0.01
 # Standing still has the dissimilarity 1 and is never accepted.
 _STILL_LIMIT = 1 - 1e-6
-# Performances compared at a time: bounds the memory. Matrix products take rows in tiles of one
-# size, so that no result depends on the other performances.
+# Trials compared at a time: bounds the memory. Matrix products take rows in tiles of one
+# size, so that no result depends on the other trials.
 _BATCH, _TILE = 64, 8
-# Most performances that are kept: the time of a prediction is proportional to their number.
+# Most trials that are kept: the time of a prediction is proportional to their number.
 _MAX_KEPT = 64
 # The golden ratio's fractional part in 64 bits: its multiples modulo 1 are evenly spread.
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -48,7 +48,7 @@ _LATER = np.uint64(1 << 63)
 
 
 def distances_by_products(a, b):
-    """Squared distances (n, n_known) of rows: faster for many performances."""
+    """Squared distances (n, n_known) of rows: faster for many trials."""
     squares = np.square(a).sum(axis=1)[:, np.newaxis] + np.square(b).sum(axis=1)
     tiles = np.zeros((-(-len(a) // _TILE), _TILE, a.shape[1]))
     tiles.reshape(-1, a.shape[1])[: len(a)] = a
@@ -67,8 +67,8 @@ def _norms(a):
     return np.vecdot(a, a)
 
 
-def _velocities(performances):
-    return smooth(performances, _VELOCITY_SMOOTHING * (performances.shape[1] - 1), order=1)
+def _velocities(trials):
+    return smooth(trials, _VELOCITY_SMOOTHING * (trials.shape[1] - 1), order=1)
 
 
 class Weights(NamedTuple):
@@ -79,7 +79,7 @@ class Weights(NamedTuple):
     scale : ndarray (n_features,) or float, default=1
         The factor of each feature.
     mean : float, default=0.1
-        The weight of the squared distance of mean postures.
+        The weight of the squared distance of mean poses.
     n_nearest : int, default=2
         A dissimilarity is the mean over so many nearest neighbours.
     """
@@ -92,34 +92,34 @@ class Weights(NamedTuple):
 _FIXED = Weights()
 
 
-def learn_weights(performances, groups, within_groups=False):
-    """Weights by how performances of an action differ.
+def learn_weights(trials, groups, within_groups=False):
+    """Weights by how trials of an action differ.
 
-    A feature has the factor ``v^(-1/4)``, where v is its variance among performances less their own
-    mean posture, averaged over the frames: deviations where people agree count more. Mean postures
+    A feature has the factor ``v^(-1/4)``, where v is its variance among trials less their own
+    mean pose, averaged over the frames: deviations where people agree count more. Mean poses
     make a twentieth of a typical dissimilarity, where their weight would not exceed a tenth.
 
     Parameters
     ----------
-    performances : ndarray (n, P, n_features), float64
+    trials : ndarray (n, P, n_features), float64
         Without gaps.
     groups : ndarray of int (n,)
     within_groups : bool, default=False
-        Weights to compare a performance with others of its group, instead of those of other groups:
-        features have equal factors, mean postures make a fifth, and the nearest one decides alone.
+        Weights to compare a trial with others of its group, instead of those of other groups:
+        features have equal factors, mean poses make a fifth, and the nearest one decides alone.
 
     Returns
     -------
     Weights
     """
-    n, n_frames, _ = performances.shape
+    n, n_frames, _ = trials.shape
     share, n_nearest = (_OWN_MEAN_SHARE, 1) if within_groups else (_MEAN_SHARE, _N_NEAREST_LEARNT)
-    energies, floor = movement_energies(performances)
+    energies, floor = movement_energies(trials)
     if energies.max() <= floor:
-        # All stand still: mean postures alone tell them apart.
+        # All stand still: mean poses alone tell them apart.
         return Weights(n_nearest=n_nearest)
-    means = performances.mean(axis=1)
-    moved = performances - means[:, np.newaxis]
+    means = trials.mean(axis=1)
+    moved = trials - means[:, np.newaxis]
     variance = moved.var(axis=0).mean(axis=0)
     largest = variance.max()
     scale = np.ones(len(variance))
@@ -140,35 +140,35 @@ def learn_weights(performances, groups, within_groups=False):
 
 
 class Neighbours:
-    """Training performances that others are compared with.
+    """Training trials that others are compared with.
 
-    The dissimilarity of two performances is the mean of ``|y - y_i|^2 / (|y|^2 + |y_i|^2)`` of
-    postures less their own mean over time, and of the same ratio of features: 0 for equal ones, 1
+    The dissimilarity of two trials is the mean of ``|y - y_i|^2 / (|y|^2 + |y_i|^2)`` of
+    poses less their own mean over time, and of the same ratio of features: 0 for equal ones, 1
     if one of them stands still, 2 for opposite ones. The weighted squared distance of the mean
-    postures is added to the first numerator.
+    poses is added to the first numerator.
 
     Parameters
     ----------
-    performances : ndarray (n_kept, P, n_features), float64
+    trials : ndarray (n_kept, P, n_features), float64
     groups : ndarray of int (n_kept,)
     features : callable, default=velocities
-        Makes features (n, P, n_compared) of performances (n, P, n_features).
+        Makes features (n, P, n_compared) of trials (n, P, n_features).
     distances : callable, default=distances_by_products
         Squared distances of rows.
     mean : ndarray (P, n_features), default=None
-        The mean performance, by which gaps (NaN) of performances are filled for their velocities
-        and means. What was not seen of both performances of a pair counts in no sum of theirs.
+        The mean trial, by which gaps (NaN) of trials are filled for their velocities
+        and means. What was not seen of both trials of a pair counts in no sum of theirs.
     weights : Weights, default=Weights()
 
     Attributes
     ----------
     stand_still : bool
-        Whether no training performance moves: then only postures are compared.
+        Whether no training trial moves: then only poses are compared.
     """
 
     def __init__(
         self,
-        performances,
+        trials,
         groups,
         features=_velocities,
         distances=distances_by_products,
@@ -177,21 +177,21 @@ class Neighbours:
     ):
         self._groups, self._features, self._distances = groups, features, distances
         self._mean, self._seen, self._weights = mean, None, weights
-        if mean is not None and is_gappy(performances):
-            self._seen = ~np.isnan(performances)
-            performances = fill_with_mean(performances, mean)
-        self._center = weights.scale * performances.mean(axis=(0, 1))
-        self._known = self._parts(performances)
-        energy, floor = movement_energies(weights.scale * performances)
+        if mean is not None and is_gappy(trials):
+            self._seen = ~np.isnan(trials)
+            trials = fill_with_mean(trials, mean)
+        self._center = weights.scale * trials.mean(axis=(0, 1))
+        self._known = self._parts(trials)
+        energy, floor = movement_energies(weights.scale * trials)
         self.stand_still = bool(energy.max() <= floor)
-        self._floor = floor * performances.shape[1]
+        self._floor = floor * trials.shape[1]
 
-    def dissimilarity(self, performances, groups=None):
-        """Mean dissimilarity of performances to their nearest neighbours.
+    def dissimilarity(self, trials, groups=None):
+        """Mean dissimilarity of trials to their nearest neighbours.
 
         Parameters
         ----------
-        performances : sequence of ndarray (P, n_features)
+        trials : sequence of ndarray (P, n_features)
         groups : ndarray of int (n,), default=None
             Their groups: then only neighbours of other groups count.
 
@@ -199,10 +199,10 @@ class Neighbours:
         -------
         ndarray (n,)
         """
-        dissimilarities = np.empty(len(performances))
-        for rows in even_slices(len(performances), _BATCH):
-            batch = np.asarray(performances[rows], dtype=np.float64)
-            # The path of a performance depends on no other one.
+        dissimilarities = np.empty(len(trials))
+        for rows in even_slices(len(trials), _BATCH):
+            batch = np.asarray(trials[rows], dtype=np.float64)
+            # The path of a trial depends on no other one.
             gaps = np.full(len(batch), self._seen is not None)
             if self._mean is not None:
                 gaps |= np.isnan(batch.sum(axis=(1, 2)))
@@ -221,27 +221,27 @@ class Neighbours:
         return dissimilarities
 
     def limit(self, moments, coverage):
-        """Largest dissimilarity that a share of new performances is expected to have.
+        """Largest dissimilarity that a share of new trials is expected to have.
 
         Parameters
         ----------
         moments : LogMoments
-            Of the dissimilarities of performances to neighbours of other groups.
+            Of the dissimilarities of trials to neighbours of other groups.
         coverage : float
 
         Returns
         -------
         float
-            Below that of standing still, unless no training performance moves.
+            Below that of standing still, unless no training trial moves.
         """
         limit = moments.upper_limit(coverage, DISSIMILARITY_VARIANCE)
         return limit if self.stand_still else min(limit, _STILL_LIMIT)
 
-    def _ratios(self, performances):
-        """Dissimilarities of performances (n, P, n_features) to each neighbour: (n, n_kept)."""
-        postures, energy, features, power = self._parts(performances)
-        known_postures, known_energy, known_features, known_power = self._known
-        apart = self._distances(postures, known_postures)
+    def _ratios(self, trials):
+        """Dissimilarities of trials (n, P, n_features) to each neighbour: (n, n_kept)."""
+        poses, energy, features, power = self._parts(trials)
+        known_poses, known_energy, known_features, known_power = self._known
+        apart = self._distances(poses, known_poses)
         if self.stand_still:
             return apart * LEAST / self._floor
         ratios = apart / np.maximum(energy[:, np.newaxis] + known_energy, self._floor)
@@ -250,22 +250,22 @@ class Neighbours:
         ratios += self._distances(features, known_features) / sums
         return ratios / 2
 
-    def _ratios_of_seen(self, performance):
-        """The same of one performance, (n_kept,), in sums over what was seen of both of a pair."""
-        seen = ~np.isnan(performance)
-        filled = fill_with_mean(performance[np.newaxis], self._mean)
-        postures, _, features, _ = self._parts(filled)
-        known_postures, _, known_features, _ = self._known
-        n_kept, width = len(known_postures), performance.shape[1]
+    def _ratios_of_seen(self, trial):
+        """The same of one trial, (n_kept,), in sums over what was seen of both of a pair."""
+        seen = ~np.isnan(trial)
+        filled = fill_with_mean(trial[np.newaxis], self._mean)
+        poses, _, features, _ = self._parts(filled)
+        known_poses, _, known_features, _ = self._known
+        n_kept, width = len(known_poses), trial.shape[1]
         both = np.broadcast_to(
             seen if self._seen is None else seen & self._seen, (n_kept, *seen.shape)
         )
         weights = both.reshape(n_kept, -1)
-        moved, energy = _sums_over(weights, postures[:, :-width], known_postures[:, :-width])
+        moved, energy = _sums_over(weights, poses[:, :-width], known_poses[:, :-width])
         changed, power = _sums_over(weights, features, known_features)
-        # Mean postures count by the share of the frames that are compared.
+        # Mean poses count by the share of the frames that are compared.
         shares = both.mean(axis=1)
-        offsets = postures[:, -width:] - known_postures[:, -width:]
+        offsets = poses[:, -width:] - known_poses[:, -width:]
         moved += (shares * np.square(offsets)).sum(axis=1)
         if self.stand_still:
             ratios = 2 * moved * LEAST / self._floor
@@ -274,42 +274,42 @@ class Neighbours:
             ratios += changed / np.maximum(power, np.finfo(float).tiny)
         return np.where(shares.any(axis=1), ratios / 2, np.inf)
 
-    def _parts(self, performances):
-        """Centred postures beside their weighted mean, features, and the squared norms of both."""
-        n, n_frames, _ = performances.shape
-        performances = self._weights.scale * performances
-        mean = performances.mean(axis=1)
-        moved = (performances - mean[:, np.newaxis]).reshape(n, -1)
+    def _parts(self, trials):
+        """Centred poses beside their weighted mean, features, and the squared norms of both."""
+        n, n_frames, _ = trials.shape
+        trials = self._weights.scale * trials
+        mean = trials.mean(axis=1)
+        moved = (trials - mean[:, np.newaxis]).reshape(n, -1)
         offset = np.sqrt(self._weights.mean * n_frames) * (mean - self._center)
-        features = self._features(performances).reshape(n, -1)
+        features = self._features(trials).reshape(n, -1)
         return np.hstack([moved, offset]), _norms(moved), features, _norms(features)
 
 
 class PersonalReference:
-    """Neighbours made of a person's own performances, and how alike people repeat themselves.
+    """Neighbours made of a person's own trials, and how alike people repeat themselves.
 
-    Few performances tell a person's mean with an error, the variance within people over their
-    number m. Therefore the mean of the own performances is moved towards that of all people,
+    Few trials tell a person's mean with an error, the variance within people over their
+    number m. Therefore the mean of the own trials is moved towards that of all people,
     feature by feature: its deviation from that has the factor ``b / (b + w / m)``, with the
     variances ``b`` between and ``w`` within people (the posterior mean of normal distributions).
 
     Parameters
     ----------
     training : ndarray (n_kept, P, n_features), float64
-        Training performances that are kept; NaN in gaps.
+        Training trials that are kept; NaN in gaps.
     groups : ndarray of int (n_kept,)
         The person of each.
     mean : ndarray (P, n_features)
-        Of all training performances.
+        Of all training trials.
     reference : ndarray (m, P, n_features)
         Of the person; NaN in gaps.
 
     Attributes
     ----------
     moments : LogMoments
-        Of the dissimilarities of training performances to m others of the same person.
+        Of the dissimilarities of training trials to m others of the same person.
     held_out : ndarray (n_kept,)
-        These dissimilarities; NaN for people with one performance.
+        These dissimilarities; NaN for people with one trial.
     """
 
     def __init__(self, training, groups, mean, reference):
@@ -318,7 +318,7 @@ class PersonalReference:
         if counts.max() < 2:
             raise ValueError(
                 "reference needs to know how people repeat themselves, but no group of the "
-                "training set has two performances: give groups to fit, and several performances "
+                "training set has two trials: give groups to fit, and several trials "
                 "of some people."
             )
         filled = fill_with_mean(training, mean)
@@ -340,16 +340,16 @@ class PersonalReference:
                 self.held_out[i] = near.dissimilarity(training[[i]])[0]
         self.moments = log_moments(self.held_out[np.isfinite(self.held_out)])
 
-    def dissimilarity(self, performances):
-        """Dissimilarity of performances to the most similar own one, (n,)."""
-        return self._neighbours.dissimilarity(performances)
+    def dissimilarity(self, trials):
+        """Dissimilarity of trials to the most similar own one, (n,)."""
+        return self._neighbours.dissimilarity(trials)
 
     def limit(self, coverage):
-        """Largest dissimilarity that a share of the person's performances is expected to have."""
+        """Largest dissimilarity that a share of the person's trials is expected to have."""
         return self._neighbours.limit(self.moments, coverage)
 
     def _near(self, reference, mean):
-        """Neighbours of performances of one person, moved towards the mean of other people."""
+        """Neighbours of trials of one person, moved towards the mean of other people."""
         reference = fill_with_mean(reference, self._mean)
         ratio = self._between / (self._between + self._within / len(reference))
         moved = reference + (ratio - 1) * (reference.mean(axis=0) - mean)
@@ -364,14 +364,14 @@ def _sums_over(weights, a, b):
 
 
 def movement_energies(on_clock, floor=None):
-    """Mean squared distance of a performance's postures from their own mean posture.
+    """Mean squared distance of a trial's poses from their own mean pose.
 
     Parameters
     ----------
     on_clock : ndarray (n_sequences, P, n_features)
         NaN in gaps: the mean is that of what was seen, feature by feature.
     floor : float, default=None
-        The energy of standing still; by default a billionth of the variance of all postures.
+        The energy of standing still; by default a billionth of the variance of all poses.
 
     Returns
     -------
@@ -394,9 +394,9 @@ def movement_energies(on_clock, floor=None):
 
 
 def _energies_of_seen(on_clock):
-    """Energies (n,) of performances with gaps, and the variance of all postures.
+    """Energies (n,) of trials with gaps, and the variance of all poses.
 
-    A feature that a performance never shows has the share of the energy that it has in the others.
+    A feature that a trial never shows has the share of the energy that it has in the others.
     """
     seen = ~np.isnan(on_clock)
     values, counts = np.where(seen, on_clock, 0), seen.sum(axis=1)
@@ -412,36 +412,36 @@ def _energies_of_seen(on_clock):
     return of_features.sum(axis=1) / np.where(share > 0, share, 1), variance
 
 
-# -- performances that come one after the other: moments of all, and a sample of them --------
+# -- trials that come one after the other: moments of all, and a sample of them --------
 
 
 @dataclass(frozen=True, eq=False)
-class PerformanceStream:
-    """Mean and variance of performances, and a sample of at most 64 of them.
+class TrialStream:
+    """Mean and variance of trials, and a sample of at most 64 of them.
 
-    All but ``dropped`` is the same, to the last bit, however performances are divided into
+    All but ``dropped`` is the same, to the last bit, however trials are divided into
     portions.
 
     Attributes
     ----------
     origin : ndarray, shape (P, n_features), float64
-        The first performance. Moments are those of differences from it, which are small.
+        The first trial. Moments are those of differences from it, which are small.
     mean_offset, squares : ndarray, shape (P, n_features), float64
         Mean of all less the origin, and the sum of squared deviations from the mean.
     kept : ndarray, shape (n_kept, P, n_features)
         One of every group, then evenly spread; in order.
     n, n_groups : int
-        Number of performances, and of their groups.
+        Number of trials, and of their groups.
     counts : ndarray, shape (P, n_features), or None
         How many of them show each value; None as long as all show all.
     labels : tuple of pairs
         Labels of groups, and their numbers from 0 in the order of first appearance.
     groups : ndarray of int, shape (n_kept,)
-        The groups of the performances that are kept.
+        The groups of the trials that are kept.
     priorities : ndarray of uint64, shape (n_kept,)
         Those with the lowest are kept.
     dropped : LogMoments
-        Of the dissimilarities of performances that are no longer kept.
+        Of the dissimilarities of trials that are no longer kept.
     """
 
     origin: np.ndarray
@@ -458,7 +458,7 @@ class PerformanceStream:
 
     @classmethod
     def starting_at(cls, first):
-        """An empty stream with a performance (P, n_features) as its origin."""
+        """An empty stream with a trial (P, n_features) as its origin."""
         zeros, origin = np.zeros(first.shape), first.astype(np.float64)
         if is_gappy(origin):
             seen = ~np.isnan(origin)
@@ -468,42 +468,42 @@ class PerformanceStream:
 
     @property
     def mean(self):
-        """Of all performances, (P, n_features); NaN where none shows anything."""
+        """Of all trials, (P, n_features); NaN where none shows anything."""
         mean = self.origin + self.mean_offset
         return mean if self.counts is None else np.where(self.counts > 0, mean, np.nan)
 
     @property
     def variance(self):
-        """Of all performances at every posture, (P, n_features), divided by their number."""
+        """Of all trials at every pose, (P, n_features), divided by their number."""
         if self.counts is None:
             return self.squares / self.n
         return np.where(self.counts > 0, self.squares / np.maximum(self.counts, 1), np.nan)
 
     @property
     def missing(self):
-        """The share (P, n_features) of the performances that do not show a value."""
+        """The share (P, n_features) of the trials that do not show a value."""
         counts = self.n if self.counts is None else self.counts
         return (self.n - np.broadcast_to(counts, self.origin.shape)) / self.n
 
-    def extend(self, performances, groups=None):
-        """The stream after more performances.
+    def extend(self, trials, groups=None):
+        """The stream after more trials.
 
         Parameters
         ----------
-        performances : sequence of ndarray (P, n_features)
+        trials : sequence of ndarray (P, n_features)
         groups : array-like (n_sequences,), default=None
-            None: each performance is a group of its own.
+            None: each trial is a group of its own.
 
         Returns
         -------
-        stream : PerformanceStream
+        stream : TrialStream
             With the same ``dropped``.
         codes : ndarray of int, shape (n_sequences,)
-            Groups of the performances.
+            Groups of the trials.
         is_kept : ndarray of bool, shape (n_kept_before + n_sequences,)
             Which of those kept before, and of these, are kept now.
         """
-        codes, given = encode_groups(groups, len(performances))
+        codes, given = encode_groups(groups, len(trials))
         labels, n_groups = dict(self.labels), self.n_groups
         if groups is None:
             codes, n_groups = codes + n_groups, n_groups + len(codes)
@@ -516,23 +516,23 @@ class PerformanceStream:
         chosen = np.sort(np.argsort(priorities, kind="stable")[:_MAX_KEPT])
         is_kept, n_before = np.zeros(len(priorities), dtype=bool), len(self.kept)
         is_kept[chosen] = True
-        moments = self._add(performances)
+        moments = self._add(trials)
         stream = replace(self, n_groups=n_groups, labels=tuple(labels.items()), **moments)
-        # Double precision as soon as any performance has it.
-        dtype = np.result_type(self.kept, performances[0])
+        # Double precision as soon as any trial has it.
+        dtype = np.result_type(self.kept, trials[0])
         if is_kept[n_before:].any() or self.kept.dtype != dtype:
             old = [self.kept[i] for i in chosen[chosen < n_before]]
-            new = [performances[i - n_before] for i in chosen[chosen >= n_before]]
+            new = [trials[i - n_before] for i in chosen[chosen >= n_before]]
             kept = np.stack(old + new).astype(dtype, copy=False)
             groups = np.concatenate([self.groups, codes])[chosen]
             stream = replace(stream, kept=kept, groups=groups, priorities=priorities[chosen])
         return stream, codes, is_kept
 
     def _priorities(self, codes):
-        """Priorities of new performances of these groups.
+        """Priorities of new trials of these groups.
 
-        The first performance of every group has priority over all others. Firsts are spread over
-        the groups, others over all performances.
+        The first trial of every group has priority over all others. Firsts are spread over
+        the groups, others over all trials.
         """
         groups, first = np.unique(codes, return_index=True)
         is_first = np.zeros(len(codes), dtype=bool)
@@ -541,11 +541,11 @@ class PerformanceStream:
         priorities = numbers.astype(np.uint64) * _GOLDEN >> np.uint64(1)
         return np.where(is_first, priorities, priorities | _LATER)
 
-    def _add(self, performances):
-        """Number, mean and squares with more performances, by Welford's recurrence."""
+    def _add(self, trials):
+        """Number, mean and squares with more trials, by Welford's recurrence."""
         n, mean, squares = self.n, self.mean_offset.copy(), self.squares.copy()
         counts = self.counts
-        for x in performances:
+        for x in trials:
             offset = x - self.origin
             if is_gappy(offset):
                 seen = ~np.isnan(offset)

@@ -1,6 +1,6 @@
-"""Variance and bands of new people, a confidence band of the mean, and random performances.
+"""Variance and bands of new people, a confidence band of the mean, and random trials.
 
-Performances of one person resemble each other, so all is estimated from how people differ from
+Trials of one person resemble each other, so all is estimated from how people differ from
 *other* people. Functions of plain arrays; features may have different units.
 """
 
@@ -19,16 +19,16 @@ __all__ = [
     "clock_error",
     "mean_band",
     "predictive_variance",
-    "sample_performances",
-    "sample_postures",
+    "sample_poses",
+    "sample_trials",
     "simultaneous_factor",
     "within_variance",
 ]
 
-# A variance is shrunk to its mean over the frames, which weighs as much as so many performances.
+# A variance is shrunk to its mean over the frames, which weighs as much as so many trials.
 _SHRINKAGE = 5
 # Prior variance of the logarithm of the largest deviation: it is 0.05 to 0.3 in the classes of
-# HDM05 and UTKinect; and that of two performances, where no variance can be left out.
+# HDM05 and UTKinect; and that of two trials, where no variance can be left out.
 _PRIOR_VARIANCE, _VAGUE_VARIANCE = 0.1, 1.0
 # Lower bounds of a largest deviation: so many standard deviations, and so much below the median
 # in the logarithm.
@@ -36,56 +36,56 @@ _LEAST, _BELOW_MEDIAN = 0.1, 1.0
 # Variance within people as a share of the predictive variance: the geometric mean over six classes
 # of HDM05 and five exercises of UI-PRMD, where it is 0.09 to 0.76.
 _WITHIN_SHARE = 0.32
-# Smallest variance, as a share of that of the feature over all frames and performances. A feature
+# Smallest variance, as a share of that of the feature over all frames and trials. A feature
 # is constant if it varies by less than a share of the most varying one, whose floor it gets.
 _FLOOR, _CONSTANT = 1e-9, 1e-15
 # Bootstrap samples, and the fewest of the group means among each other.
 _N_DRAWS, _MIN_DRAWS = 2000, 50
 
 
-def predictive_variance(performances, groups, shrinkage=_SHRINKAGE):
-    """Variance of a new person's postures about the mean of the performances.
+def predictive_variance(trials, groups, shrinkage=_SHRINKAGE):
+    """Variance of a new person's poses about the mean of the trials.
 
     ``v = ((n - 1) s^2 + k mean(s^2)) / (n - 1 + k) (1 + 1 / n)``, where ``s^2`` is the mean squared
-    deviation of performances from the mean of all performances of *other* groups, and its mean
+    deviation of trials from the mean of all trials of *other* groups, and its mean
     is that over the frames, feature by feature.
 
     Parameters
     ----------
-    performances : ndarray, shape (n, P, n_features)
+    trials : ndarray, shape (n, P, n_features)
         At least 2. NaN in gaps: then n is the number of deviations that are known of a value.
     groups : ndarray of int, shape (n,)
-        If all are of one group, each performance counts as a group of its own.
+        If all are of one group, each trial counts as a group of its own.
     shrinkage : float, default=5
-        ``k``: the mean over the frames weighs as much as so many performances.
+        ``k``: the mean over the frames weighs as much as so many trials.
 
     Returns
     -------
     ndarray, shape (P, n_features)
-        Positive, also where performances do not differ.
+        Positive, also where trials do not differ.
     """
-    n, codes = len(performances), _at_least_two(groups)
-    squares = np.square(performances - mean_of_others(performances, codes))
+    n, codes = len(trials), _at_least_two(groups)
+    squares = np.square(trials - mean_of_others(trials, codes))
     if is_gappy(squares):
         n = (~np.isnan(squares)).sum(axis=0)
         squares = np.nansum(squares, axis=0) / np.maximum(n, 1)
         n, squares = np.maximum(n, 1), np.where(n > 0, squares, np.nan)
     else:
         squares = squares.mean(axis=0)
-    return np.maximum(_shrink(squares, n, shrinkage) * (1 + 1 / n), _floor(performances))
+    return np.maximum(_shrink(squares, n, shrinkage) * (1 + 1 / n), _floor(trials))
 
 
-def within_variance(performances, groups):
-    """Variance of a person's postures about the mean of this person, pooled over the people.
+def within_variance(trials, groups):
+    """Variance of a person's poses about the mean of this person, pooled over the people.
 
     ``w = (d s^2 + k mean(s^2)) / (d + k)``, where ``s^2`` is the sum of the squared deviations from
-    the mean of the own group, divided by their degrees of freedom ``d``: performances less groups,
+    the mean of the own group, divided by their degrees of freedom ``d``: trials less groups,
     of groups of at least two. The mean is that over the frames, feature by feature. A new
-    performance of a person deviates from the mean of n others by ``w (1 + 1 / n)``.
+    trial of a person deviates from the mean of n others by ``w (1 + 1 / n)``.
 
     Parameters
     ----------
-    performances : ndarray, shape (n, P, n_features)
+    trials : ndarray, shape (n, P, n_features)
         At least 2. NaN in gaps: then d is that of a value.
     groups : ndarray of int, shape (n,)
         In a feature that no group shows twice, the variance is 0.32 times `predictive_variance`:
@@ -94,58 +94,58 @@ def within_variance(performances, groups):
     Returns
     -------
     ndarray, shape (P, n_features)
-        Positive, also where performances do not differ.
+        Positive, also where trials do not differ.
     """
     codes = np.unique(groups, return_inverse=True)[1].ravel()
-    counts = group_counts(performances, codes)
-    sums = sums_of_groups(np.nan_to_num(performances), codes)[0]
+    counts = group_counts(trials, codes)
+    sums = sums_of_groups(np.nan_to_num(trials), codes)[0]
     means = sums / np.maximum(counts, 1)
     freedom = np.maximum(counts - 1, 0).sum(axis=0)
-    squares = np.nansum(np.square(performances - means[codes]), axis=0)
+    squares = np.nansum(np.square(trials - means[codes]), axis=0)
     squares = np.where(freedom > 0, squares / np.maximum(freedom, 1), np.nan)
-    # The shrinkage counts performances, one more than degrees of freedom.
-    variance = np.maximum(_shrink(squares, freedom + 1, _SHRINKAGE), _floor(performances))
+    # The shrinkage counts trials, one more than degrees of freedom.
+    variance = np.maximum(_shrink(squares, freedom + 1, _SHRINKAGE), _floor(trials))
     unknown = ~freedom.any(axis=0)
     if unknown.any():
-        unseen = performances[..., unknown]
+        unseen = trials[..., unknown]
         variance[:, unknown] = _WITHIN_SHARE * predictive_variance(unseen, codes)
     return variance
 
 
-def simultaneous_factor(performances, groups, coverage):
-    """The c for which a share of whole performances of new people lies within mean +- c sqrt(v).
+def simultaneous_factor(trials, groups, coverage):
+    """The c for which a share of whole trials of new people lies within mean +- c sqrt(v).
 
     ``v`` is the predictive variance. Each group is left out in turn and compared with the mean and
-    the variance of the others. The logarithms of the largest ``|z|`` of its performances, over all
+    the variance of the others. The logarithms of the largest ``|z|`` of its trials, over all
     frames and features, predict that of a new person by a Student t distribution. Their
-    variance has a prior of 0.1, which weighs as much as 3 performances.
+    variance has a prior of 0.1, which weighs as much as 3 trials.
 
     Of new people of HDM05 and UTKinect a band of nominal 95 % holds 94 to 97 % of the
-    performances in the aSpace and 97 to 100 % in postures, of 5 to 20 training ones; without
+    trials in the aSpace and 97 to 100 % in poses, of 5 to 20 training ones; without
     groups, of 10 or more, 76 to 85 % of those of HDM05, where people came about six times.
 
     Parameters
     ----------
-    performances : ndarray, shape (n, P, n_features)
+    trials : ndarray, shape (n, P, n_features)
     groups : ndarray of int, shape (n,)
     coverage : float
-        Share of the performances, between 0 and 1.
+        Share of the trials, between 0 and 1.
 
     Returns
     -------
     float
     """
     codes, prior = _at_least_two(groups), _PRIOR_VARIANCE
-    mean = mean_of_others(performances, codes)
-    largest = np.empty(len(performances))
+    mean = mean_of_others(trials, codes)
+    largest = np.empty(len(trials))
     for group in range(codes.max() + 1):
         out = codes == group
         compared = ~out
         if compared.sum() == 1:
-            # A single performance has no variance: that of both takes its place.
+            # A single trial has no variance: that of both takes its place.
             compared, prior = slice(None), _VAGUE_VARIANCE
-        variance = predictive_variance(performances[compared], codes[compared])
-        z = (performances[out] - mean[out]) / np.sqrt(variance)
+        variance = predictive_variance(trials[compared], codes[compared])
+        z = (trials[out] - mean[out]) / np.sqrt(variance)
         # Of what was seen.
         largest[out] = np.fmax.reduce(np.abs(z), axis=(1, 2), initial=0)
     logs = np.log(np.maximum(largest, _LEAST))
@@ -153,23 +153,23 @@ def simultaneous_factor(performances, groups, coverage):
     return LogMoments.of_logs(logs).upper_limit(coverage, prior)
 
 
-def mean_band(performances, groups, coverage, random_state=None):
+def mean_band(trials, groups, coverage, random_state=None):
     """Half-widths of a simultaneous confidence band of the *population's* mean.
 
-    The population's mean is that of a new person's performances, where people are a random sample
-    and do not depend on how many performances they have. Its estimate is the mean of the
-    performances, in which a group weighs as much as it has performances. Its variance is that of
+    The population's mean is that of a new person's trials, where people are a random sample
+    and do not depend on how many trials they have. Its estimate is the mean of the
+    trials, in which a group weighs as much as it has trials. Its variance is that of
     the jackknife by groups, shrunk towards its mean over the frames. The factor is the quantile of
     the largest ``|t|`` over all frames and features in a studentised bootstrap over groups: as many
-    groups with as many performances are drawn from the normal distribution with the covariance of
+    groups with as many trials are drawn from the normal distribution with the covariance of
     the group means, and mean and variance are estimated from each draw.
 
-    In simulations with 4 to 20 people of 1 to 5 performances each, a band of nominal 95 % holds the
+    In simulations with 4 to 20 people of 1 to 5 trials each, a band of nominal 95 % holds the
     mean in 92 to 99 % of the cases; one of nominal 80 % in 67 to 78 %.
 
     Parameters
     ----------
-    performances : ndarray, shape (n, P, n_features)
+    trials : ndarray, shape (n, P, n_features)
     groups : ndarray of int, shape (n,)
     coverage : float
         Probability that the band holds the mean at all frames and in all features.
@@ -181,17 +181,17 @@ def mean_band(performances, groups, coverage, random_state=None):
     """
     random_state = check_random_state(random_state)
     codes = _at_least_two(groups)
-    sums, counts = sums_of_groups(np.nan_to_num(performances), codes)
-    n_groups, n, shape = len(sums), len(performances), performances.shape[1:]
+    sums, counts = sums_of_groups(np.nan_to_num(trials), codes)
+    n_groups, n, shape = len(sums), len(trials), trials.shape[1:]
     weights, n_seen = counts[:, 0, 0] / n, n_groups
-    if is_gappy(performances):
+    if is_gappy(trials):
         # Each value has weights of its own: a group that does not show it has none.
-        counts = group_counts(performances, codes)
+        counts = group_counts(trials, codes)
         weights = (counts / counts.sum(axis=0)).reshape(n_groups, -1)
         n_seen = (counts > 0).sum(axis=0)
     # Without group g the mean changes by w_g / (1 - w_g) (mean - mean_g).
     jackknife = (1 - 1 / np.ravel(n_seen)) * np.square(weights / (1 - weights))
-    floor = _floor(performances) / n
+    floor = _floor(trials) / n
 
     def estimate(means):
         mean = _weigh(weights, means)
@@ -218,13 +218,13 @@ def mean_band(performances, groups, coverage, random_state=None):
 
 
 def clock_error(mean, lower, upper):
-    """Standard error of a mean performance by that of the clock: (P, n_features).
+    """Standard error of a mean trial by that of the clock: (P, n_features).
 
     Parameters
     ----------
     mean : ndarray, shape (P, n_features)
     lower, upper : ndarray, shape (n_sequences, P)
-        Intervals of one standard error about the times of performances.
+        Intervals of one standard error about the times of trials.
     """
     error = (upper - lower).mean(axis=0) / 2
     return np.abs(np.gradient(mean, axis=0)) * error[:, np.newaxis]
@@ -236,7 +236,7 @@ def _weigh(weights, values):
 
 
 def _at_least_two(groups):
-    """Codes of the groups; of a single group, every performance is one of its own."""
+    """Codes of the groups; of a single group, every trial is one of its own."""
     codes = np.unique(groups, return_inverse=True)[1].ravel()
     return codes if codes.max() > 0 else np.arange(len(codes))
 
@@ -253,39 +253,39 @@ def _shrink(squares, n, shrinkage=_SHRINKAGE):
     return np.where(is_known, ((n - 1) * squares + shrinkage * mean) / (n - 1 + shrinkage), mean)
 
 
-def _floor(performances):
-    var = np.nanvar if is_gappy(performances) else np.var
-    spread = var(performances, axis=(0, 1))
+def _floor(trials):
+    var = np.nanvar if is_gappy(trials) else np.var
+    spread = var(trials, axis=(0, 1))
     largest = spread.max() if spread.max() > 0 else 1.0
     return _FLOOR * np.where(spread > _CONSTANT * largest, spread, largest)
 
 
-# -- new performances ------------------------------------------------------------------------------
+# -- new trials ------------------------------------------------------------------------------
 
-# Shares of the variance of a sampled posture: of one training performance, of a mixture of all,
-# and of noise that is independent in every feature; a sampled performance has the first two. Noise
+# Shares of the variance of a sampled pose: of one training trial, of a mixture of all,
+# and of noise that is independent in every feature; a sampled trial has the first two. Noise
 # tangles limbs; the first keeps bodies in one piece and styles apart (docs/design.md).
-_POSTURE = (0.84, 0.14, 0.02)
-_PERFORMANCE = (0.64, 0.36)
-# A performance that is outside reaches its training performance in so many steps.
+_POSE = (0.84, 0.14, 0.02)
+_TRIAL = (0.64, 0.36)
+# A trial that is outside reaches its training trial in so many steps.
 _STEPS = 4
 
 
-def sample_postures(mean, variance, deviations, n, n_std, random_state):
-    """Sample postures at a frame, inside the envelope there.
+def sample_poses(mean, variance, deviations, n, n_std, random_state):
+    """Sample poses at a frame, inside the envelope there.
 
-    Each is near the posture of a training performance chosen at random. Before truncation their
-    mean is that of the training postures, their variance ``variance``, and their
-    covariance is that of the training postures, shrunk a little towards its diagonal (2 %).
+    Each is near the pose of a training trial chosen at random. Before truncation their
+    mean is that of the training poses, their variance ``variance``, and their
+    covariance is that of the training poses, shrunk a little towards its diagonal (2 %).
     Each feature is truncated by the monotone function that makes a normal distribution a truncated
     one: no sample is rejected, and features keep their correlations.
 
     Parameters
     ----------
     mean, variance : ndarray, shape (n_features,)
-        Of the training postures.
+        Of the training poses.
     deviations : ndarray, shape (n_kept, n_features)
-        Training postures less the mean, in the same units.
+        Training poses less the mean, in the same units.
     n : int
         How many.
     n_std : float
@@ -300,33 +300,33 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state):
     spread = deviations.std(axis=0)
     shapes = (deviations - deviations.mean(axis=0)) / np.where(spread > 0, spread, 1)
     chosen = random_state.randint(len(shapes), size=n)
-    one, mixed, noise = _POSTURE
+    one, mixed, noise = _POSE
     z = _mixtures(chosen, len(shapes), one, mixed, random_state) @ shapes
     z += np.sqrt(noise) * random_state.standard_normal(z.shape)
     std = np.sqrt(variance)
     lower, upper = mean - n_std * std, mean + n_std * std
-    postures = mean + _truncate(z, n_std) * std
-    return np.clip(postures.astype(mean.dtype), lower, upper)
+    poses = mean + _truncate(z, n_std) * std
+    return np.clip(poses.astype(mean.dtype), lower, upper)
 
 
-def sample_performances(mean, variance, deviations, n, dissimilarity, threshold, random_state):
-    """Sample whole performances, of a dissimilarity up to a threshold.
+def sample_trials(mean, variance, deviations, n, dissimilarity, threshold, random_state):
+    """Sample whole trials, of a dissimilarity up to a threshold.
 
-    Each is a random mixture of the training performances' deviations, dominated by one that is
+    Each is a random mixture of the training trials' deviations, dominated by one that is
     inside itself, with the variance of all. A sample outside moves in steps to that training
-    performance; not to the mean, which need not be inside. Features that are directions are mixed
+    trial; not to the mean, which need not be inside. Features that are directions are mixed
     in the tangent space of the sphere at their mean, and keep the length 1 (`directions_in`).
 
     Parameters
     ----------
     mean, variance : ndarray, shape (P, n_features)
-        Of the training performances.
+        Of the training trials.
     deviations : ndarray, shape (n_kept, P, n_features)
-        Training performances less the mean.
+        Training trials less the mean.
     n : int
         How many.
     dissimilarity : callable
-        Of performances (m, P, n_features): m numbers, each independent of the others.
+        Of trials (m, P, n_features): m numbers, each independent of the others.
     threshold : float
         Largest dissimilarity inside.
     random_state : RandomState
@@ -334,19 +334,19 @@ def sample_performances(mean, variance, deviations, n, dissimilarity, threshold,
     Returns
     -------
     ndarray, shape (n, P, n_features), of the mean's dtype
-        If no training performance is inside, their dissimilarity is up to that of the most
+        If no training trial is inside, their dissimilarity is up to that of the most
         typical one.
     """
     space = TangentSpace(mean, deviations)
     known = space.coordinates
-    of_known = dissimilarity(space.performances(known))
+    of_known = dissimilarity(space.trials(known))
     inside = np.flatnonzero(of_known <= threshold)
     centers = inside if len(inside) else np.array([first_smallest(of_known)])
     chosen = centers[random_state.randint(len(centers), size=n)]
-    weights = _mixtures(chosen, len(known), *_PERFORMANCE, random_state)
+    weights = _mixtures(chosen, len(known), *_TRIAL, random_state)
     drawn = np.tensordot(weights, known - known.mean(axis=0), axes=1)
     drawn *= _scale(variance, deviations)
-    samples = space.performances(drawn)
+    samples = space.trials(drawn)
     outside = np.arange(n)
     for step in range(1, _STEPS + 1):
         outside = outside[dissimilarity(samples[outside]) > threshold]
@@ -354,12 +354,12 @@ def sample_performances(mean, variance, deviations, n, dissimilarity, threshold,
             break
         share = step / _STEPS
         coordinates = (1 - share) * drawn[outside] + share * known[chosen[outside]]
-        samples[outside] = space.performances(coordinates)
+        samples[outside] = space.trials(coordinates)
     return samples
 
 
 def _mixtures(chosen, n_kept, one, mixed, random_state):
-    """Weights (n, n_kept) of mixtures: shares of the variance of one performance, and of all."""
+    """Weights (n, n_kept) of mixtures: shares of the variance of one trial, and of all."""
     weights = random_state.standard_normal((len(chosen), n_kept)) * np.sqrt(mixed / n_kept)
     weights[np.arange(len(chosen)), chosen] += np.sqrt(one)
     return weights
@@ -380,25 +380,25 @@ def _scale(variance, deviations):
 
 
 # Directions have the length 1. Interpolation between frames shortens them: the median stays above
-# the first; jumps of a tracker shorten some to 0.06 (190 performances of a Kinect).
+# the first; jumps of a tracker shorten some to 0.06 (190 trials of a Kinect).
 _MEDIAN_LENGTH, _MIN_LENGTH, _MAX_LENGTH = 0.99, 1e-3, 1 + 1e-3
 
 
 class TangentSpace:
-    """Coordinates of performances about a mean: tangents for directions, differences for numbers.
+    """Coordinates of trials about a mean: tangents for directions, differences for numbers.
 
     Parameters
     ----------
     mean : ndarray, shape (P, n_features)
     deviations : ndarray, shape (n, P, n_features)
-        Performances less the mean.
+        Trials less the mean.
 
     Attributes
     ----------
     directions : list of slice
         Of features; see `directions_in`.
     coordinates : ndarray, shape (n, P, n_features)
-        Of the performances.
+        Of the trials.
     """
 
     def __init__(self, mean, deviations):
@@ -414,8 +414,8 @@ class TangentSpace:
             self._bases.append(base)
             self.coordinates[..., columns] = log_map(base, directions)
 
-    def performances(self, coordinates):
-        """Performances (m, P, n_features) of coordinates: their directions have the length 1."""
+    def trials(self, coordinates):
+        """Trials (m, P, n_features) of coordinates: their directions have the length 1."""
         out = self.mean + coordinates
         for columns, base in zip(self.directions, self._bases, strict=True):
             tangents = coordinates[..., columns]
@@ -424,19 +424,19 @@ class TangentSpace:
         return out.astype(self.mean.dtype)
 
 
-def directions_in(performances):
+def directions_in(trials):
     """Features that are directions: three or two columns in a row, of length 1 at all frames.
 
     Parameters
     ----------
-    performances : ndarray, shape (n, P, n_features)
+    trials : ndarray, shape (n, P, n_features)
 
     Returns
     -------
     list of slice
     """
     directions, start = [], 0
-    squares = np.square(performances.astype(np.float64))
+    squares = np.square(trials.astype(np.float64))
     while start < squares.shape[2]:
         for width in (3, 2):
             columns = slice(start, start + width)

@@ -10,9 +10,9 @@ from sklearn.utils.validation import check_is_fitted
 from ..body.axes import convert_to_parent_axes
 from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import LIMB_NAMES, limb_indices, unit_vectors
-from ..inputs.collections import Performances, as_collection
+from ..inputs.collections import Trials, as_collection
 from ..inputs.features import as_features, names_of_features
-from ..inputs.validation import check_performances, labels_of_input, names_of_input
+from ..inputs.validation import check_trials, labels_of_input, names_of_input
 from ..matching.counting import first_largest
 from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.linear import LinearSynchronizer
@@ -42,21 +42,21 @@ __all__ = [
 ]
 
 # Residual variance of a new person at a frame, in units of the mean residual variance of the
-# training postures after the aSpace: with this 93 and 94 % of held-out actors have no rare
+# training poses after the aSpace: with this 93 and 94 % of held-out actors have no rare
 # departure (HDM05, UTKinect; nominal 95 %), with 1 it was 80 and 84 %.
 _RESIDUAL_FACTOR = 4
 
 
 class Curves(NamedTuple):
-    """Performances on the clock of a model, each matched once.
+    """Trials on the clock of a model, each matched once.
 
     Attributes
     ----------
     names : list of str
         The features of ``whole``.
     whole : ndarray (n_sequences, P, n_features)
-        The postures before an aSpace, if there is one; otherwise the features of the model.
-    points : performances
+        The poses before an aSpace, if there is one; otherwise the features of the model.
+    points : trials
         In the features of the model, checked.
     match : Match or None
         By the first synchronizer; None without one.
@@ -64,18 +64,18 @@ class Curves(NamedTuple):
 
     names: list
     whole: np.ndarray
-    points: Performances
+    points: Trials
     match: Match | None
 
 
 def curves_of(estimator, X, params, caller):
-    """Performances on the clock of the model of an estimator, with what an aSpace leaves out.
+    """Trials on the clock of the model of an estimator, with what an aSpace leaves out.
 
     Parameters
     ----------
     estimator : ActionModel, or Pipeline with one
         Fitted.
-    X : performances, as the estimator takes them
+    X : trials, as the estimator takes them
     params : dict
         What synchronizing X takes besides, such as ``keyframes``.
     caller : str
@@ -92,7 +92,7 @@ def curves_of(estimator, X, params, caller):
 
 
 class View(NamedTuple):
-    """A model in chosen features, and the performances that reach it.
+    """A model in chosen features, and the trials that reach it.
 
     Attributes
     ----------
@@ -101,19 +101,19 @@ class View(NamedTuple):
     names : list of str
         Its features.
     synchronised : ndarray (n_sequences, P, n_features) or None
-        Performances in these features.
+        Trials in these features.
     whole : ndarray (n_sequences, P, n_features) or None
         The same with the residuals of an aSpace.
     labels : list
-        Of these performances.
+        Of these trials.
     curves : Curves or None
-        The same performances as they reach the model of the estimator.
+        The same trials as they reach the model of the estimator.
     model_of_points : ActionModel
         That model.
     residual_variance : ndarray (n_features,)
         Variance of a new person outside the aSpace.
     in_linear_time : ndarray (n_examples, P, n_known) or None
-        Training performances before synchronisation, linearly normalised, in the first of these
+        Training trials before synchronisation, linearly normalised, in the first of these
         features, as many as the synchronizer takes. None without a synchronizer that keeps some.
     """
 
@@ -129,26 +129,26 @@ class View(NamedTuple):
 
     @property
     def training(self):
-        """Training performances that are kept, about the mean of all: (n_kept, P, n_features)."""
+        """Training trials that are kept, about the mean of all: (n_kept, P, n_features)."""
         return _training_of(self.model)
 
     @property
     def predicted(self):
-        """Predicted standard deviations of whole performances of a new person."""
+        """Predicted standard deviations of whole trials of a new person."""
         return np.sqrt(self.model.predictive_variance_ + self.residual_variance)
 
 
-def view_of(estimator, X=None, params=None, caller="", *, features=None, postures=False):
-    """The model of an estimator in chosen features: its own, or those of postures.
+def view_of(estimator, X=None, params=None, caller="", *, features=None, poses=False):
+    """The model of an estimator in chosen features: its own, or those of poses.
 
     Parameters
     ----------
     estimator, X, params, caller : as for `curves_of`, default=None
         Without X there is the model alone.
     features : int, str or list of them, default=None
-        If one of them is no feature of the model, the model is transformed back to the postures
-        before its `ASpace`, by a fit on its training performances there, at most 64.
-    postures : bool, default=False
+        If one of them is no feature of the model, the model is transformed back to the poses
+        before its `ASpace`, by a fit on its training trials there, at most 64.
+    poses : bool, default=False
         Whether to do so whenever there is such an aSpace.
 
     Returns
@@ -165,7 +165,7 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     names = names_of_features(before, model, model.mean_.shape[1])
     is_needed = any(isinstance(f, str) and f not in names for f in as_features(features))
     route = _Route.without_aspace(before)
-    if before is not None and (is_needed or postures):
+    if before is not None and (is_needed or poses):
         route = _Route.to(before, names, is_needed)
     curves, points, labels = None, None, []
     if X is not None:
@@ -184,13 +184,13 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
 
 
 def _training_of(model):
-    """Training performances that a model kept, about the mean of all, not of these."""
+    """Training trials that a model kept, about the mean of all, not of these."""
     deviations = model.deviations_
     return model.mean_ + deviations - deviations.mean(axis=0)
 
 
 def _examples(before, route, n_features):
-    """Training performances in linear time, in features of the model or in postures; or None."""
+    """Training trials in linear time, in features of the model or in poses; or None."""
     try:
         synchronizer = find_synchronizer(before)[1] if before is not None else None
     except ValueError:
@@ -249,27 +249,25 @@ class _Route(NamedTuple):
         return cls(Pipeline(named) if named else None, None, steps[count:])
 
     def names(self, names_of_model):
-        """The features of postures, and those of the model beside the points of the aSpace."""
+        """The features of poses, and those of the model beside the points of the aSpace."""
         aspace = self.aspace
-        of_postures = names_of_features(self.before, aspace, aspace.n_features_in_)
-        return [*of_postures, *names_of_model[len(aspace.components_) :]]
+        of_poses = names_of_features(self.before, aspace, aspace.n_features_in_)
+        return [*of_poses, *names_of_model[len(aspace.components_) :]]
 
     def transform(self, points):
-        """Postures of points of the aSpace."""
+        """Poses of points of the aSpace."""
         components, mean = self.aspace.components_, self.aspace.mean_
         points, beside = np.split(points, [len(components)], axis=2)
         return np.concatenate([points @ components + mean, beside], axis=2)
 
     def curves(self, model, X, params, caller, names):
-        """The `Curves` of performances."""
+        """The `Curves` of trials."""
         methods = [(step, name) for step in self.after for name in ("match", "transform")]
         takers = [getattr(step, name) for step, name in methods if hasattr(step, name)]
         points = transform_through(self.before, X, params, caller, also=takers)
         whole, first = None, None
         if self.aspace is not None:
-            whole = check_performances(
-                self.aspace, points, reset=False, level="posture", finite="allow-nan"
-            )
+            whole = check_trials(self.aspace, points, reset=False, level="pose", finite="allow-nan")
             points = self.aspace.transform(points)
         # Names are those of tables, which a match does not make.
         once = names_of_input(model) is None
@@ -278,7 +276,7 @@ class _Route(NamedTuple):
                 points, match = _through(step, points, params, once)
                 whole = whole if whole is None or match is None else match.warp(whole)
                 first = match if first is None else first
-        checked = model.check_performances(points)
+        checked = model.check_trials(points)
         if whole is None:
             return Curves(names, np.stack(checked), checked, first)
         beside = np.stack(as_collection(points))[:, :, len(self.aspace.components_) :]
@@ -287,7 +285,7 @@ class _Route(NamedTuple):
 
 
 def _through(step, points, params, once):
-    """Performances after a step, and their match if it makes one.
+    """Trials after a step, and their match if it makes one.
 
     Synchronizers that only warp match them once, where tables are not asked for.
     """
@@ -295,9 +293,9 @@ def _through(step, points, params, once):
     if hasattr(step, "match"):
         only_warps = isinstance(step, DenseSynchronizer | LinearSynchronizer)
         if once and only_warps and type(points) in (list, np.ndarray):
-            points = step.check_performances(points)
+            points = step.check_trials(points)
         match = step.match(points, **accepted_params(step.match, params))
-        if isinstance(points, Performances) and points.kind != "rows":
+        if isinstance(points, Trials) and points.kind != "rows":
             return match.warp(points), match
     return step.transform(points, **accepted), match
 
@@ -329,12 +327,12 @@ class LimbColumns(NamedTuple):
             features = np.asarray(step.inverse_transform(features[:, :width]))
         return features[:, self.columns]
 
-    def in_parent_axes(self, performances):
+    def in_parent_axes(self, trials):
         """The height, if there is one, and the cosines along the axes of the parent limbs.
 
         Parameters
         ----------
-        performances : ndarray (n, P, n_features)
+        trials : ndarray (n, P, n_features)
             In features of the view, without gaps.
 
         Returns
@@ -344,8 +342,8 @@ class LimbColumns(NamedTuple):
         """
         skeleton = self.cosines.skeleton
         limbs, n_dims, first = skeleton.limbs, skeleton.n_dims, int(skeleton.has_height)
-        n, n_frames, width = performances.shape
-        columns = self.invert(performances.reshape(-1, width))
+        n, n_frames, width = trials.shape
+        columns = self.invert(trials.reshape(-1, width))
         vectors = columns[:, first:].reshape(len(columns), -1, n_dims)
         cosines = np.zeros((len(vectors), len(LIMB_NAMES), n_dims))
         cosines[:, limb_indices(limbs)] = unit_vectors(vectors)
@@ -404,14 +402,14 @@ def _columns_of(cosines, names):
 
 
 class ClassModel(NamedTuple):
-    """The model of a class, and the performances that are predicted to be of this class.
+    """The model of a class, and the trials that are predicted to be of this class.
 
     Attributes
     ----------
     label : label of the class
     estimator : Pipeline
         Fitted: the steps before the classifier, and those of ``model_of(label)``.
-    performances : performances, as the estimator takes them
+    trials : trials, as the estimator takes them
     indices : ndarray of int
         Their indices among all.
     labels : list
@@ -420,7 +418,7 @@ class ClassModel(NamedTuple):
 
     label: object
     estimator: Pipeline
-    performances: object
+    trials: object
     indices: np.ndarray
     labels: list
 
@@ -432,13 +430,13 @@ def models_of_classes(estimator, X, params, caller, only=None):
     ----------
     estimator : estimator or Pipeline
         Fitted.
-    X : performances, as the estimator takes them
+    X : trials, as the estimator takes them
     params : dict
         What the steps before the classifier take besides.
     caller : str
         The public function that the user called with (estimator, X), for messages.
     only : callable, default=None
-        Gives the index of a single performance, of their number; by default all.
+        Gives the index of a single trial, of their number; by default all.
 
     Returns
     -------
@@ -450,12 +448,12 @@ def models_of_classes(estimator, X, params, caller, only=None):
         return None
     before, classifier = located
     features = transform_through(before, X, params, caller)
-    performances = classifier.check_performances(features)
-    chosen = np.arange(len(performances))
+    trials = classifier.check_trials(features)
+    chosen = np.arange(len(trials))
     if only is not None:
-        chosen = chosen[[only(len(performances))]]
-    columns = first_largest(classifier.predict_proba(performances.take(chosen)), axis=1)
-    collection, all_labels = as_collection(X), labels_of_input(X, performances)[0]
+        chosen = chosen[[only(len(trials))]]
+    columns = first_largest(classifier.predict_proba(trials.take(chosen)), axis=1)
+    collection, all_labels = as_collection(X), labels_of_input(X, trials)[0]
     steps, models = [] if before is None else before.steps, []
     for column in dict.fromkeys(columns.tolist()):
         indices, label = chosen[columns == column], classifier.classes_[column]

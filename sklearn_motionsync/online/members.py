@@ -43,21 +43,21 @@ class Track(NamedTuple):
 
     Parameters
     ----------
-    postures : ndarray, shape (n_frames, n_features)
-        Expected postures, given the observations.
+    poses : ndarray, shape (n_frames, n_features)
+        Expected poses, given the observations.
     covariances : ndarray, shape (n_frames, n_features, n_features)
-        Of the postures, over all possible phases, and larger where what is seen is improbable;
+        Of the poses, over all possible phases, and larger where what is seen is improbable;
         without the noise of observations.
     phases : ndarray, shape (n_frames,)
         Weighted medians of the particles, in frames of the clock, 0 to P - 1.
     rates : ndarray, shape (n_frames,)
-        Weighted medians of the pace: 1 is the mean of the training performances, 2 twice as fast,
+        Weighted medians of the pace: 1 is the mean of the training trials, 2 twice as fast,
         0 at the end of the movement.
     effective_sizes : ndarray, shape (n_frames,)
         Effective sample sizes of the particles, ``1 / sum w^2``. Of a smoothed take: the number of
         different particles on its paths.
     lost : ndarray of bool, shape (n_frames,)
-        Whether velocities or postures are improbable at all phases.
+        Whether velocities or poses are improbable at all phases.
 
     See Also
     --------
@@ -75,7 +75,7 @@ class Track(NamedTuple):
     (40, 1, 1)
     """
 
-    postures: np.ndarray
+    poses: np.ndarray
     covariances: np.ndarray
     phases: np.ndarray
     rates: np.ndarray
@@ -83,7 +83,7 @@ class Track(NamedTuple):
     lost: np.ndarray
 
     def __repr__(self):
-        n_frames, n_features = np.size(self.lost), self.postures.shape[-1]
+        n_frames, n_features = np.size(self.lost), self.poses.shape[-1]
         n_lost = np.count_nonzero(self.lost)
         return (
             f"Track({n_frames} frames of {counted(n_features, 'feature')}, {n_lost} of them lost)"
@@ -110,9 +110,9 @@ class PooledFilter:
 
     @property
     def estimate(self):
-        """The expected posture, and its covariance."""
+        """The expected pose, and its covariance."""
         mean = self.model.pooled_mean + self.deviations.means[0, 0]
-        return mean, self.deviations.posture_covariance
+        return mean, self.deviations.pose_covariance
 
     def update(self, values, dt, observer):
         """Take an observation, a time after the one before."""
@@ -207,9 +207,9 @@ def pool(estimates, evidence, model):
 
 
 def stack_frames(frames, dtype):
-    """The `Track` of each frame as one, postures in this precision."""
-    postures, covariances, *numbers = map(np.array, zip(*frames, strict=True))
-    return Track(*(x.astype(dtype, copy=False) for x in (postures, covariances)), *numbers)
+    """The `Track` of each frame as one, poses in this precision."""
+    poses, covariances, *numbers = map(np.array, zip(*frames, strict=True))
+    return Track(*(x.astype(dtype, copy=False) for x in (poses, covariances)), *numbers)
 
 
 def filter_take(model, seed, values, times, observer):
@@ -272,11 +272,11 @@ def smooth_take(model, seed, values, times, observer):
 
 
 def _smooth_frame(model, past, path, evidence, on_paths, without):
-    """The `Track` of a frame from the postures and covariances of both members."""
-    postures, covariance = on_paths
-    off = postures - postures.mean(axis=0)
+    """The `Track` of a frame from the poses and covariances of both members."""
+    poses, covariance = on_paths
+    off = poses - poses.mean(axis=0)
     estimates = (
-        (postures.mean(axis=0), covariance + off.T @ off / len(off)),
+        (poses.mean(axis=0), covariance + off.T @ off / len(off)),
         (without[0][0], without[1]),
     )
     return Track(
@@ -366,7 +366,7 @@ def _log_transition(model, before, after, path):
 
 
 def smooth_deviations(process, frames, observer):
-    """Postures of several hypotheses given all observations, and their common covariance.
+    """Poses of several hypotheses given all observations, and their common covariance.
 
     That is the modified Bryson-Frazier smoother, which inverts the innovation covariance only. The
     Kalman filter runs twice, first for the states at the beginning of each block of frames.
@@ -380,7 +380,7 @@ def smooth_deviations(process, frames, observer):
     Returns
     -------
     list of tuple
-        Of each frame the postures (n_paths, n_features), and the covariance.
+        Of each frame the poses (n_paths, n_features), and the covariance.
     """
     blocks = [slice(i, i + _BLOCK) for i in range(0, len(frames), _BLOCK)]
     states = [DeviationFilter(process, len(frames[0].expected))]
@@ -389,15 +389,15 @@ def smooth_deviations(process, frames, observer):
     out, later = [], None
     for block, state in zip(blocks[::-1], states[::-1], strict=True):
         filtered, _ = _filter_block(frames[block], observer, state)
-        for frame, (postures, columns, update) in reversed(
+        for frame, (poses, columns, update) in reversed(
             list(zip(frames[block], filtered, strict=True))
         ):
             covariance = columns[: columns.shape[1]]
             if later is not None:
                 adjoint, information = later
-                postures = postures - adjoint @ columns
+                poses = poses - adjoint @ columns
                 covariance = covariance - columns.T @ information @ columns
-            out.append((postures, covariance))
+            out.append((poses, covariance))
             later = _adjoint_step(process, frame, update, later)
     return out[::-1]
 
@@ -405,7 +405,7 @@ def smooth_deviations(process, frames, observer):
 def _filter_block(frames, observer, state):
     """The Kalman filter on from a state, a `DeviationFilter` that stays as it is.
 
-    Returns a list of filtered frames, and the state after them. A filtered frame has the postures
+    Returns a list of filtered frames, and the state after them. A filtered frame has the poses
     (n_paths, n_features), the columns of the state covariance that belong to the values,
     (2 n_features, n_features), and the `KalmanUpdate`, None without observations.
     """
@@ -482,7 +482,7 @@ class ParticleFilter:
     initial : bool
         Whether the particles know nothing of what was before the last frame.
     expected : ndarray, shape (n_particles, n_features)
-        The mean performance at their phases.
+        The mean trial at their phases.
     deviations : DeviationFilter
     accepted : ndarray of bool, shape (n_observed,)
         The observations of the last frame that were used.
@@ -501,13 +501,13 @@ class ParticleFilter:
 
     @property
     def estimate(self):
-        """The expected posture, and its covariance over all phases."""
+        """The expected pose, and its covariance over all phases."""
         weights = self.particles.weights
-        postures = self.expected + self.deviations.means[0]
-        posture = weights @ postures
-        off = postures - posture
+        poses = self.expected + self.deviations.means[0]
+        pose = weights @ poses
+        off = poses - pose
         off *= np.sqrt(weights)[:, np.newaxis]
-        return posture, self.deviations.posture_covariance + off.T @ off
+        return pose, self.deviations.pose_covariance + off.T @ off
 
     def update(self, values, time, observer):
         """Take an observation.
@@ -517,7 +517,7 @@ class ParticleFilter:
         values : ndarray, shape (n_observed,)
             NaN where nothing is seen.
         time : float
-            In frames of the training performances, later than that of the frame before.
+            In frames of the training trials, later than that of the frame before.
         observer : Observer
         """
         dt, self.time = time - self.time, time
@@ -580,13 +580,13 @@ class ParticleFilter:
         self.accepted = seen
         self.innovation = float(self.particles.weights @ update.nis)
         self.slopes.add(residuals, seen)
-        posture_nis = self._posture_nis(self.particles.weights @ residuals, rows, noise)
+        pose_nis = self._pose_nis(self.particles.weights @ residuals, rows, noise)
         known = self.slopes.have_slopes(seen)
         velocity_nis = self._reweight(known, observer, dt) if known.any() else self.nis[0]
-        self._update_nis(np.array([velocity_nis, posture_nis]), dt)
+        self._update_nis(np.array([velocity_nis, pose_nis]), dt)
 
-    def _posture_nis(self, residuals, rows, noise):
-        """NIS of a posture with these residuals (n_seen,) from the mean."""
+    def _pose_nis(self, residuals, rows, noise):
+        """NIS of a pose with these residuals (n_seen,) from the mean."""
         covariance = rows @ self.model.process.covariance @ rows.T + noise
         whitened = whitening(covariance) @ residuals
         return self._shrink_nis(whitened @ whitened / len(rows), len(rows))
@@ -608,11 +608,11 @@ class ParticleFilter:
         return 1 + (nis - 1) * min(np.sqrt(n / self.model.mean.shape[1]), 1.0)
 
     def _update_nis(self, nis, dt):
-        """Average the NIS (2,) of velocities and postures, and compare them with their limits."""
+        """Average the NIS (2,) of velocities and poses, and compare them with their limits."""
         limits = self.model.nis_limits
         self.nis = exponential_average(self.nis, nis, dt, self.model.clock.memory)
         if self.lost:
-            # The limit of postures stays: a person's style persists.
+            # The limit of poses stays: a person's style persists.
             self.lost = bool((self.nis > [(1 + limits[0]) / 2, limits[1]]).any())
         elif (self.nis > limits).any():
             self.lost, self.since_search = True, np.inf

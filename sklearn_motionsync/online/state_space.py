@@ -24,13 +24,13 @@ __all__ = [
 _WINDOW = 0.03
 # Time constant of the averages of the NIS, in windows.
 _MEMORY = 3.0
-# The limits of the NIS of velocities and postures are so many times farther from 1 than the largest
+# The limits of the NIS of velocities and poses are so many times farther from 1 than the largest
 # of the training set.
 _EXCESS = 4.0, 2.0
 # And that of velocities at least so many standard deviations of the average of a NIS.
 _CHANCE = 8.0
-# The limit of the NIS of postures is at least three standard deviations squared.
-_MIN_POSTURE_LIMIT = 9.0
+# The limit of the NIS of poses is at least three standard deviations squared.
+_MIN_POSE_LIMIT = 9.0
 # The gate of single observations: a NIS, or so many times the largest of the training set.
 _MIN_GATE, _GATE_FACTOR = 100.0, 10.0
 # Probability of a restart at the end of the movement in a hundredth of the mean duration.
@@ -54,12 +54,12 @@ class TrackerModel(NamedTuple):
     velocities : ndarray, shape (n_features, n_features)
         Covariance of the differences of causal velocities from those of the mean.
     nis_limits : ndarray, shape (2,)
-        Averages of the normalised innovation squared (NIS) of velocities, and of postures, beyond
+        Averages of the normalised innovation squared (NIS) of velocities, and of poses, beyond
         which the phase is lost; 1 is expected.
     gate : float
         The NIS of a single frame beyond which it is ignored.
     noise : ndarray, shape (n_features, n_features)
-        Covariance of the noise of a whole observed posture.
+        Covariance of the noise of a whole observed pose.
     tempering : float
     n_particles : int
     """
@@ -79,12 +79,12 @@ class TrackerModel(NamedTuple):
 
     @classmethod
     def learn(cls, warped, rates, groups, clock, noise, tempering, n_particles):
-        """Learn from synchronised performances.
+        """Learn from synchronised trials.
 
         Parameters
         ----------
         warped : ndarray, shape (n, P, n_features)
-            At least two performances.
+            At least two trials.
         rates : ndarray, shape (n, P)
             Their rates along the clock.
         groups : ndarray of int, shape (n,)
@@ -103,12 +103,12 @@ class TrackerModel(NamedTuple):
         velocities = _shrunk(_moments(slopes), _SHRINKAGE)
         by_velocity = _largest_nis(slopes, unit_noise, noise, velocities, step, clock.memory)
         once = np.ones(deviations.shape[1])
-        by_posture = _largest_nis(deviations, once, noise, process.covariance, step, clock.memory)
+        by_pose = _largest_nis(deviations, once, noise, process.covariance, step, clock.memory)
         # Velocities of different windows are independent.
         chance = _CHANCE * np.sqrt(2 / (warped.shape[2] * _MEMORY))
         excess = (
             max(_EXCESS[0] * (by_velocity - 1), chance),
-            max(_EXCESS[1] * (by_posture - 1), _MIN_POSTURE_LIMIT - 1),
+            max(_EXCESS[1] * (by_pose - 1), _MIN_POSE_LIMIT - 1),
         )
         gate = max(_MIN_GATE, _GATE_FACTOR * _largest_innovation(deviations, process, step, noise))
         return cls(
@@ -128,14 +128,14 @@ class TrackerModel(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """The clock of the pattern, and times in frames of the training performances.
+    """The clock of the pattern, and times in frames of the training trials.
 
     Parameters
     ----------
     last : float
         The last frame of the clock.
     duration : float
-        Mean time from the first frame of a performance to its last.
+        Mean time from the first frame of a trial to its last.
     """
 
     last: float
@@ -143,7 +143,7 @@ class Clock(NamedTuple):
 
     @property
     def speed(self):
-        """Frames of the clock that a performance of mean duration passes a unit of time."""
+        """Frames of the clock that a trial of mean duration passes a unit of time."""
         return self.last / self.duration
 
     def restart_probability(self, dt):
@@ -289,7 +289,7 @@ def _correlation_lag(series, level):
     return float(n_frames)
 
 
-# -- limits of the normalised innovation squared, from the training performances ---------
+# -- limits of the normalised innovation squared, from the training trials ---------
 
 
 def _causal_slopes(deviations, step, window):
@@ -519,7 +519,7 @@ class DeviationFilter:
         self.covariance = self.process.stationary
 
     @property
-    def posture_covariance(self):
+    def pose_covariance(self):
         """Of the values: (n_features, n_features)."""
         width = self.means.shape[2]
         return self.covariance[:width, :width]

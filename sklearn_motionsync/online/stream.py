@@ -1,4 +1,4 @@
-"""Running performances, frame by frame: streams matched by rows of the trellis (Eqs. 16 and 17)."""
+"""Running trials, frame by frame: streams matched by rows of the trellis (Eqs. 16 and 17)."""
 
 import warnings
 from collections import deque
@@ -37,17 +37,17 @@ _FORGETTING = 3
 
 
 class LivePhase(NamedTuple):
-    """The phase of a running performance, its rate, and how sure it is.
+    """The phase of a running trial, its rate, and how sure it is.
 
     All values have the shape of the phase: numbers of a frame, arrays of several frames or
-    performances.
+    trials.
 
     Parameters
     ----------
     phase : float, or ndarray
         Frame of the pattern, from 0 to P - 1.
     rate : float, or ndarray
-        Pace in units of the mean pace of the training performances.
+        Pace in units of the mean pace of the training trials.
     confidence : float, or ndarray
         Probability, from 0 to 1, that the phase is right to a twentieth of the clock.
     lower, upper : float, or ndarray, default=None
@@ -79,7 +79,7 @@ class LivePhase(NamedTuple):
 
 
 class Session:
-    """Performances that run side by side, from their first frame on.
+    """Trials that run side by side, from their first frame on.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Session:
     frame : ndarray, shape (n_features,) or (n_streams, n_features)
         The first frame, which ``step`` still has to take.
     time : float
-        Its time, in frames of the training performances.
+        Its time, in frames of the training trials.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Session:
         self.history = deque(maxlen=_HISTORY_LENGTH)
 
     def restart(self, stream):
-        """Begin another performance of one stream with the next frame."""
+        """Begin another trial of one stream with the next frame."""
         self._streams.restart(stream)
         self._resampler.restart(stream)
         self._course.restart(stream)
@@ -120,7 +120,7 @@ class Session:
         if self._shape != frame.shape:
             raise ValueError(
                 f"The frames before had the shape {self._shape}, this one has {frame.shape}: give "
-                "the same performances in each, NaN for what is not seen, or call reset()."
+                "the same trials in each, NaN for what is not seen, or call reset()."
             )
         self.time = time
         for sample in self._resampler.add(np.atleast_2d(frame), time):
@@ -134,7 +134,7 @@ class Session:
         return phases if frame.ndim == 1 else each_value(phases, np.copy)
 
     def time_left(self):
-        """Frames of the training performances until the end of each stream, or of its cycle."""
+        """Frames of the training trials until the end of each stream, or of its cycle."""
         left = self._course.time_left()
         return left if len(self._shape) == 2 else float(left[0])
 
@@ -147,7 +147,7 @@ class Course:
     n_frames : int
         P, the length of the clock.
     duration : float
-        Mean duration of a performance, in the unit of times.
+        Mean duration of a trial, in the unit of times.
     cyclic : bool
     n_streams : int, default=1
     """
@@ -161,7 +161,7 @@ class Course:
         self._period = np.full(n_streams, float(duration))
 
     def restart(self, stream):
-        """Begin another performance of one stream with the next frame."""
+        """Begin another trial of one stream with the next frame."""
         self._begin[stream], self._one_begins = np.nan, True
         self._share[stream], self._cycle[stream], self._period[stream] = 0, 0, self._duration
 
@@ -195,7 +195,7 @@ class Course:
 
 
 class Streams:
-    """Performances that are matched to a reference at the same samples.
+    """Trials that are matched to a reference at the same samples.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ class Streams:
         self._cached = None
 
     def restart(self, stream):
-        """Begin another performance of one stream with the next sample."""
+        """Begin another trial of one stream with the next sample."""
         self.trellis.restart(stream)
         self._derivative.restart(stream)
         self._n_samples[stream] = self._path_cost[stream] = self.mean_cost[stream] = 0
@@ -250,11 +250,11 @@ class Streams:
     def update(self, sample):
         """Take a sample (n_streams, n_features), one frame of the clock after the one before."""
         reference = self.reference
-        postures = reference.unit(sample)
-        velocity = self._derivative.step(postures)
+        poses = reference.unit(sample)
+        velocity = self._derivative.step(poses)
         # The unit makes constant features 0, observed or not.
         hidden = np.isnan(velocity) | np.isnan(sample)
-        compared, parts = reference.features.compare(velocity, postures), {}
+        compared, parts = reference.features.compare(velocity, poses), {}
         observed = self._fully_observed
         if hidden.any():
             observed = 1 - hidden.mean(axis=1)
@@ -268,7 +268,7 @@ class Streams:
                 if part is None:
                     observed[rows] = 0
                 else:
-                    part = part.compare(velocity[rows], postures[rows]), part.moving
+                    part = part.compare(velocity[rows], poses[rows]), part.moving
                 parts[tuple(rows)] = part
         self.trellis.advance(compared, parts, self._moves(velocity))
         self._update_window(observed)
@@ -350,9 +350,9 @@ class Resampler:
     Parameters
     ----------
     step : float
-        Time between two samples, in frames of the training performances.
+        Time between two samples, in frames of the training trials.
     n_frames : int
-        Samples of a performance of mean duration.
+        Samples of a trial of mean duration.
     frame : ndarray, shape (n_streams, n_features)
         The first frame.
     time : float
@@ -556,20 +556,20 @@ def check_observations(x, what, names, width, ndims=(1,)) -> np.ndarray:
 
 
 def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
-    """The times of frames, checked, in frames of the training performances.
+    """The times of frames, checked, in frames of the training trials.
 
     Parameters
     ----------
     times : float, array-like of shape (n_frames,), or None
-        In seconds if there is a frame rate, else in frames of the training performances. None: one
+        In seconds if there is a frame rate, else in frames of the training trials. None: one
         frame of these follows another, the first at 0.
     n_frames : int
     frame_rate : float, default=None
-        Frames a second of the training performances.
+        Frames a second of the training trials.
     what : str
         What to call the sequence in messages.
     after : float, default=None
-        Time of the frame before these, in frames of the training performances.
+        Time of the frame before these, in frames of the training trials.
 
     Returns
     -------
@@ -585,7 +585,7 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
     Warns
     -----
     UserWarning
-        If frames are more than 24 frames of the training performances apart, or less than 1/24, in
+        If frames are more than 24 frames of the training trials apart, or less than 1/24, in
         the median: times in milliseconds where seconds are meant.
     """
     if times is None:
@@ -611,15 +611,15 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
         by = f", by {SMALLEST:g} to {LARGEST:g} frames" if steps[i] > 0 else ""
         raise ValueError(
             f"{what}: time stamps must increase{by}, but {now:.10g} follows {before:.10g}. Leave "
-            "out a frame that comes twice or late; begin another performance with reset()."
+            "out a frame that comes twice or late; begin another trial with reset()."
         )
     step = 1.0 if n_frames < _FEW else float(np.median(np.diff(frames)))
     if not 1 / _OTHER_UNIT < step < _OTHER_UNIT:
-        unit = "frames of the training performances" if frame_rate is None else "seconds"
+        unit = "frames of the training trials" if frame_rate is None else "seconds"
         warnings.warn(
             f"{what}: times are in {unit}, and {step / scale:.4g} of them from one frame to the "
-            f"next are {step:.4g} frames of the training performances. Give them in this unit, and "
-            "the frame_rate of the training performances.",
+            f"next are {step:.4g} frames of the training trials. Give them in this unit, and "
+            "the frame_rate of the training trials.",
             UserWarning,
             stacklevel=4,
         )
@@ -627,12 +627,12 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
 
 
 def times_of_each(times, n):
-    """A list with the times of each of n performances, or None for each without times."""
+    """A list with the times of each of n trials, or None for each without times."""
     if times is None:
         return [None] * n
     count = len(times) if np.iterable(times) else "none"
     if count != n:
         raise ValueError(
-            f"There must be one sequence of times for each performance, got {count} for {n}."
+            f"There must be one sequence of times for each trial, got {count} for {n}."
         )
     return list(times)

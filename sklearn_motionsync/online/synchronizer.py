@@ -1,4 +1,4 @@
-"""OnlineSynchronizer: the phase of performances that are still running."""
+"""OnlineSynchronizer: the phase of trials that are still running."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.facts import TIMELESS
 from ..inputs.numbers import check_magnitude
-from ..inputs.types import Indexed, NumbersLike, PerformancesLike, SupportsArray, ValuesLike
-from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
+from ..inputs.types import Indexed, NumbersLike, SupportsArray, TrialsLike, ValuesLike
+from ..inputs.validation import SequenceLevelMixin, check_trials, names_of_input
 from ..inputs.wording import counted
 from ..matching.costs import step_table
 from ..matching.counting import first_largest
@@ -51,10 +51,10 @@ __all__ = ["OnlineSynchronizer", "Reference"]
 class OnlineSynchronizer(
     DocumentedMixin, LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator
 ):
-    """The phase of a performance while it runs, frame by frame, however long it will last.
+    """The phase of a trial while it runs, frame by frame, however long it will last.
 
     The frames so far are the base of the trellis, and the mean of the synchronised training
-    performances is the moving sequence (Eqs. 12-17). A performance begins with frame 0 of the
+    trials is the moving sequence (Eqs. 12-17). A trial begins with frame 0 of the
     pattern; its phase is the best cell of the last row. A frame costs one row of the trellis,
     whatever came before it, and no phase depends on later frames. With ``cyclic=True`` the mean is
     one cycle of a movement that goes on, such as walking, and the row is a circle.
@@ -62,13 +62,13 @@ class OnlineSynchronizer(
     Parameters
     ----------
     synchronizer : Synchronizer, default=None
-        Synchronises the training performances; a clone of it is fitted. None is
+        Synchronises the training trials; a clone of it is fitted. None is
         ``DenseSynchronizer()``.
     frame_rate : float, default=None
-        Frames a second of the training performances. Times are then in seconds; without it
-        in frames of the training performances.
+        Frames a second of the training trials. Times are then in seconds; without it
+        in frames of the training trials.
     cyclic : bool, default=False
-        Whether the training performances are cycles of a movement that repeats, such as strides cut
+        Whether the training trials are cycles of a movement that repeats, such as strides cut
         by `CycleSegmenter`: each ends where it begins. The phase then begins anywhere in the cycle,
         goes on with 0 after P - 1, and ``LivePhase.cycle`` counts cycles.
 
@@ -77,10 +77,10 @@ class OnlineSynchronizer(
     synchronizer_ : Synchronizer
         The fitted synchronizer.
     mean_ : ndarray, shape (P, n_features)
-        Mean of the training performances on the clock of the pattern; of cycles the last frame is
+        Mean of the training trials on the clock of the pattern; of cycles the last frame is
         the first one.
     duration_ : float
-        Mean time from the first frame of a training performance to its last, in frames: the mean
+        Mean time from the first frame of a training trial to its last, in frames: the mean
         of ``n_frames - 1``.
     n_frames_ : int
         ``P``.
@@ -91,19 +91,19 @@ class OnlineSynchronizer(
 
     See Also
     --------
-    MotionTracker : Postures and phase of a body that is partly hidden.
-    DenseSynchronizer : For whole performances.
+    MotionTracker : Poses and phase of a body that is partly hidden.
+    DenseSynchronizer : For whole trials.
 
     Notes
     -----
-    ``step`` and ``reset`` change the estimator, which holds the running performances. A copy, or an
+    ``step`` and ``reset`` change the estimator, which holds the running trials. A copy, or an
     unpickled estimator, goes on by itself from there.
 
     The features are those of the synchronizer, with its learnt metric, from causal velocities and
-    from postures less the mean posture. The velocity filters delay both sequences alike. The rate
+    from poses less the mean pose. The velocity filters delay both sequences alike. The rate
     is at most 3. The phase may go back when later frames contradict it. No rest is needed before
     the beginning: a performer at rest there stays in the first frames of the clock. In the last
-    posture the phase is the end, P - 1.
+    pose the phase is the end, P - 1.
 
     When the movement begins anew, before its end or after it, the phase goes back and
     ``LivePhase.cycle`` rises: as soon as a path that began again, at a cost of 6 temperatures,
@@ -119,12 +119,12 @@ class OnlineSynchronizer(
 
     The confidence is the probability mass within a twentieth of the clock of the phase, divided by
     the square of the recent cost in units of the typical cost, where it is above that. The
-    temperature of the probabilities and the typical cost are learnt: each training performance is
-    matched to the mean of the others. From a single performance they cannot be learnt, and are
+    temperature of the probabilities and the typical cost are learnt: each training trial is
+    matched to the mean of the others. From a single trial they cannot be learnt, and are
     the medians of 16 actions of people. Other actions cost more. A movement that is its own
     reverse, such as a bend, costs no more backwards, and standing still costs nothing where the
     mean stands still. The typical cost of a cycle is the geometric mean of that and the cost of
-    standing still, in the posture of the cycle where that costs least.
+    standing still, in the pose of the cycle where that costs least.
 
     Features that are NaN are not compared. During frames of NaN, or time without frames,
     the phase moves on at the mean pace. Between the frames that show it a feature is interpolated
@@ -148,7 +148,7 @@ class OnlineSynchronizer(
     >>> 1 < live.time_left() < len(frames) / 30  # seconds
     True
 
-    In the first posture the performance does not go on:
+    In the first pose the trial does not go on:
 
     >>> live.reset()
     >>> for k in range(200):
@@ -189,20 +189,20 @@ class OnlineSynchronizer(
     @validated_with_nested
     def fit(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         y: object = None,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
     ) -> Self:
-        """Learn the mean performance, its duration, and the scale of path costs.
+        """Learn the mean trial, its duration, and the scale of path costs.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : ignored
             Passed to the synchronizer.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each performance, passed to the synchronizer, which has to take them.
+            Key-frames of each trial, passed to the synchronizer, which has to take them.
 
         Returns
         -------
@@ -212,27 +212,27 @@ class OnlineSynchronizer(
         Raises
         ------
         ValueError
-            As from the ``fit`` of the synchronizer; or if ``cyclic=True`` and the performances do
+            As from the ``fit`` of the synchronizer; or if ``cyclic=True`` and the trials do
             not end where they begin.
         """
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
-        performances = self._check_training_set(X)
+        trials = self._check_training_set(X)
         metadata: dict[str, Any] = {} if keyframes is None else {"keyframes": keyframes}
         with self._progress(fits=True) as progress:
             with progress.fitting(sync, "synchronizing"):
                 sync.fit(X, y, **metadata)
             match = sync.match(X, **metadata)
-            warped = match.warp(performances)
+            warped = match.warp(trials)
             if self.cyclic:
                 check_cycles(sync.features_.unit(warped.mean(axis=0)))
-                performances, warped = list(map(closed, performances)), closed(warped)
+                trials, warped = list(map(closed, trials)), closed(warped)
             mean = warped.mean(axis=0)
-            duration = float(np.mean([len(x) for x in performances]) - 1)
+            duration = float(np.mean([len(x) for x in trials]) - 1)
 
             def reference_of(mean, *calibration):
                 return Reference(sync.features_, mean, duration, *calibration, cyclic=self.cyclic)
 
-            calibration = calibrate(reference_of, performances, warped, match.times, progress)
+            calibration = calibrate(reference_of, trials, warped, match.times, progress)
             reference = reference_of(mean, *calibration, _RESTART * calibration[0])
         self.synchronizer_, self.n_frames_ = sync, sync.n_frames_
         self.mean_, self.duration_ = mean, duration
@@ -245,24 +245,24 @@ class OnlineSynchronizer(
         Parameters
         ----------
         frame : array-like, shape (n_features,), or (n_streams, n_features)
-            A frame of one performance, or of several that run side by side. NaN is not seen.
+            A frame of one trial, or of several that run side by side. NaN is not seen.
         time : float, default=None
             Time of the frame: in seconds if there is a ``frame_rate``, else in frames of the
-            training performances; from any origin. None: a frame of the training performances
+            training trials; from any origin. None: a frame of the training trials
             after the one before.
 
         Returns
         -------
         LivePhase
             ``phase``, ``rate``, ``confidence``, ``lower`` and ``upper``: numbers for one
-            performance, arrays (n_streams,) for several.
+            trial, arrays (n_streams,) for several.
 
         Raises
         ------
         ValueError
             If the frame is infinite or above 1e9, has another width or other names, there are not
             as many streams as in the frames before, or time does not increase, by 1e-9 to 1e9
-            frames. The performance then goes on as if the frame had not been given.
+            frames. The trial then goes on as if the frame had not been given.
         """
         if "_session" not in self.__dict__:
             check_is_fitted(self, "mean_")
@@ -278,12 +278,12 @@ class OnlineSynchronizer(
         return session.step(frame, time)
 
     def reset(self, stream: int | Sequence[int] | np.ndarray | None = None) -> None:
-        """Begin another performance with the next frame, and count from 0 again.
+        """Begin another trial with the next frame, and count from 0 again.
 
         Parameters
         ----------
         stream : int or array-like of int, default=None
-            Of several performances those that end, while the others go on. None: all of
+            Of several trials those that end, while the others go on. None: all of
             them, and time begins again, too.
         """
         check_is_fitted(self, "mean_")
@@ -296,7 +296,7 @@ class OnlineSynchronizer(
         known = streams.dtype.kind in "iu" and np.isin(streams, np.arange(-n_streams, n_streams))
         if streams.ndim > 1 or (len(streams) and not np.all(known)):
             raise ValueError(
-                f"stream={stream!r} is not among {counted(n_streams, 'running performance')}: give "
+                f"stream={stream!r} is not among {counted(n_streams, 'running trial')}: give "
                 "an index of these or several, or None for all."
             )
         if session is not None:
@@ -304,7 +304,7 @@ class OnlineSynchronizer(
                 session.restart(int(n))
 
     def time_left(self) -> Any:
-        """Estimate the time until the performance ends, or the cycle that runs.
+        """Estimate the time until the trial ends, or the cycle that runs.
 
         Of a cycle what is left of the phase, at the pace of the last cycle. Otherwise a weighted
         mean of what is left of the mean duration after the elapsed time, and of what is left of the
@@ -314,7 +314,7 @@ class OnlineSynchronizer(
         Returns
         -------
         float, or ndarray of shape (n_streams,)
-            Seconds if there is a ``frame_rate``, else frames of the training performances.
+            Seconds if there is a ``frame_rate``, else frames of the training trials.
         """
         check_is_fitted(self, "mean_")
         session = self._session
@@ -334,17 +334,17 @@ class OnlineSynchronizer(
 
     def track(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         times: Indexed[ValuesLike] | ValuesLike | None = None,
     ) -> list[LivePhase]:
-        """The phases of whole performances, as ``step`` estimates them frame by frame.
+        """The phases of whole trials, as ``step`` estimates them frame by frame.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances, each independent of the others and of ``step``. NaN is not seen.
+            Trials, each independent of the others and of ``step``. NaN is not seen.
         times : list of array-like (n_frames_i,), default=None
-            Times of the frames of each performance, as in ``step``.
+            Times of the frames of each trial, as in ``step``.
 
         Returns
         -------
@@ -354,10 +354,10 @@ class OnlineSynchronizer(
         Raises
         ------
         ValueError
-            As from ``step``; or if there are not as many times as performances.
+            As from ``step``; or if there are not as many times as trials.
         """
         check_is_fitted(self, "mean_")
-        performances = check_performances(
+        trials = check_trials(
             self,
             X,
             reset=False,
@@ -367,46 +367,46 @@ class OnlineSynchronizer(
             facts=None if times is None else TIMELESS,
             timed=times is not None,
         )
-        tracks, times_of = [], times_of_each(times, len(performances))
-        for i, (x, t) in enumerate(zip(performances, times_of, strict=True)):
-            t = check_times(t, len(x), self.frame_rate, performances.called(i))
+        tracks, times_of = [], times_of_each(times, len(trials))
+        for i, (x, t) in enumerate(zip(trials, times_of, strict=True)):
+            t = check_times(t, len(x), self.frame_rate, trials.called(i))
             frames = x.astype(np.float64)
             session = Session(self._reference, frames[0], t[0])
             tracks.append(stack_phases(list(map(session.step, frames, t))))
         return tracks
 
 
-# -- the reference: what running performances are matched to -------------------------------
+# -- the reference: what running trials are matched to -------------------------------
 
 # Positions a frame of the pattern.
 _SUBFRAMES = 2
 # Weight of the change of pace, ``mu``, in units of the mean squared norm of the features; and the
 # largest rate, in units of the mean pace.
 _SMOOTHNESS, _MAX_RATE = 0.1, 3
-# After the end the last posture is held for so many widths of the velocity filters, after which
+# After the end the last pose is held for so many widths of the velocity filters, after which
 # these have forgotten the movement.
 _REST = 6
 
 
 class Reference:
-    """A mean performance that running performances are matched to, and its trellis.
+    """A mean trial that running trials are matched to, and its trellis.
 
-    The features are those of the synchronizer, from causal velocities and postures. Velocities of
-    both sequences have the same delay. Postures are centred at the mean posture of the reference,
-    as the mean of a running performance is not known yet.
+    The features are those of the synchronizer, from causal velocities and poses. Velocities of
+    both sequences have the same delay. Poses are centred at the mean pose of the reference,
+    as the mean of a running trial is not known yet.
 
     Parameters
     ----------
     features : Features
         Of the fitted synchronizer.
     mean : ndarray, shape (P, n_features)
-        The mean performance.
+        The mean trial.
     duration : float
-        Mean duration of the training performances, in their frames.
+        Mean duration of the training trials, in their frames.
     temperature : float, default=1.0
         Path costs over it are negative log-probabilities of phases.
     typical_cost : float, default=inf
-        Mean cost of a sample that half of the training performances never exceed.
+        Mean cost of a sample that half of the training trials never exceed.
     interval_temperature : float, default=1.0
         Path costs over it give the probabilities whose quantiles bound the phase.
 
@@ -415,17 +415,17 @@ class Reference:
     n_frames : int
         ``P``.
     duration : float
-        Mean duration, in frames of the training performances.
+        Mean duration, in frames of the training trials.
     width : float
         Time constant of the velocity filters, in frames of the clock.
     step : float
-        A frame of the clock, in frames of the training performances.
+        A frame of the clock, in frames of the training trials.
     features : FeatureSubset
         All features.
     moving : ndarray, shape (Q, n_compared)
-        Those of the mean performance, with its last posture held.
-    postures : ndarray, shape (Q, n_features)
-        Its postures, in the unit of the features.
+        Those of the mean trial, with its last pose held.
+    poses : ndarray, shape (Q, n_features)
+        Its poses, in the unit of the features.
     speed : ndarray, shape (n_features,)
         The mean square of its velocity.
     trellis : Trellis
@@ -449,12 +449,12 @@ class Reference:
         self.duration = self.step * last
         self.temperature, self.typical_cost = temperature, typical_cost
         self.interval_temperature = interval_temperature
-        postures = self.unit(normalise([mean.astype(np.float64)], len(mean), _SUBFRAMES)[0])
-        self.centre, self._n_positions = postures.mean(axis=0), len(postures)
+        poses = self.unit(normalise([mean.astype(np.float64)], len(mean), _SUBFRAMES)[0])
+        self.centre, self._n_positions = poses.mean(axis=0), len(poses)
         rest = 0 if cyclic else max(1, math.ceil(_REST * self.width))
-        held = np.repeat(postures[-1:], rest * _SUBFRAMES, axis=0)
-        self.postures = np.concatenate([postures, held])
-        self._velocity = causal_velocity(self.postures, _SUBFRAMES, self.width, cyclic)
+        held = np.repeat(poses[-1:], rest * _SUBFRAMES, axis=0)
+        self.poses = np.concatenate([poses, held])
+        self._velocity = causal_velocity(self.poses, _SUBFRAMES, self.width, cyclic)
         self.speed = np.square(self._velocity[: self._n_positions]).mean(axis=0)
         self.features, self._cached = self._subset(np.arange(mean.shape[1])), {}
         self.moving = self.features.moving
@@ -485,14 +485,14 @@ class Reference:
         if metric is not None:
             rows = np.isin(metric.features, columns)
             columns = metric.features[rows]
-            # The energy of the mean performance in these features.
+            # The energy of the mean trial in these features.
             velocity = self._velocity[: self._n_positions, columns]
             energy = float(np.square(velocity).sum(axis=1).mean())
-            metric = Metric(columns, energy, metric.velocity[rows], metric.posture[rows])
+            metric = Metric(columns, energy, metric.velocity[rows], metric.pose[rows])
             columns = columns if energy > 0 else columns[:0]
         if not len(columns):
             return None
-        return FeatureSubset(self, columns, metric, self._velocity, self.postures)
+        return FeatureSubset(self, columns, metric, self._velocity, self.poses)
 
 
 class FeatureSubset:
@@ -501,63 +501,63 @@ class FeatureSubset:
     Attributes
     ----------
     moving : ndarray, shape (Q, n_compared)
-        Those of the mean performance.
+        Those of the mean trial.
     """
 
-    def __init__(self, reference, columns, metric, velocity, postures):
+    def __init__(self, reference, columns, metric, velocity, poses):
         self._cost, self._centre = reference.cost, reference.centre
         self._columns, self._metric = columns, metric
-        self.moving = self.compare(velocity, postures)
+        self.moving = self.compare(velocity, poses)
 
-    def compare(self, velocity, postures):
-        """Features of velocities and postures (n, n_features) in the unit of the reference."""
+    def compare(self, velocity, poses):
+        """Features of velocities and poses (n, n_features) in the unit of the reference."""
         velocity = velocity[:, self._columns]
-        postures = (postures - self._centre)[:, self._columns]
+        poses = (poses - self._centre)[:, self._columns]
         if self._metric is None:
-            return cost_features(postures, self._cost, velocity=velocity)
-        return self._metric.of_parts(compressed(velocity, self._metric.energy), postures)
+            return cost_features(poses, self._cost, velocity=velocity)
+        return self._metric.of_parts(compressed(velocity, self._metric.energy), poses)
 
 
-# -- calibration: what path costs say, learnt from the training performances ---------------
+# -- calibration: what path costs say, learnt from the training trials ---------------
 
-# Performances, and moments of each, that calibration uses at most.
-_MAX_PERFORMANCES, _MAX_MOMENTS = 24, 120
+# Trials, and moments of each, that calibration uses at most.
+_MAX_TRIALS, _MAX_MOMENTS = 24, 120
 # Largest distance of the ends of a cycle, in root mean square deviations. Measured: 0.01 to 0.8 for
 # strides, 1.7 to 2.5 for sitting down, standing up, picking up, throwing.
 _APART = 1.5
 # A cycle is repeated so many times, of which all but the first count.
 _REPEATED = 3
-# Postures of a cycle in which a stream may stand still. That cost, in typical costs, is at least so
+# Poses of a cycle in which a stream may stand still. That cost, in typical costs, is at least so
 # much: the confidence is then below one half.
-_POSTURES, _STANDING = 16, 1.5
+_POSES, _STANDING = 16, 1.5
 # Temperatures that are tried, in mean squared features of a sample; the smallest probability.
 _TEMPERATURES = np.geomspace(0.01, 1e3, 41)
 _MIN_PROBABILITY = 1e-12
-# For a single training performance: medians of 16 actions of people, in mean squared features.
+# For a single training trial: medians of 16 actions of people, in mean squared features.
 _DEFAULT_TEMPERATURE, _DEFAULT_COST = 0.7, 0.5
-# Share of the training phases inside the intervals. Other training performances are partly of the
+# Share of the training phases inside the intervals. Other training trials are partly of the
 # same person. For new people temperatures are raised, of actions and of cycles: docs/design.md.
 _COVERAGE, _NEW_PEOPLE = 0.9, (1.5, 6.0)
 # The cost of beginning anew, in temperatures.
 _RESTART = 6.0
-# Of intervals, for a single training performance: by pairs of people of HDM05.
+# Of intervals, for a single training trial: by pairs of people of HDM05.
 _DEFAULT_INTERVAL = 8.0
 
 
-def calibrate(reference_of, performances, warped, times, progress):
+def calibrate(reference_of, trials, warped, times, progress):
     """Learn the temperatures and the typical cost of a `Reference`.
 
-    Each training performance is matched to the mean of the others. The temperature maximises the
+    Each training trial is matched to the mean of the others. The temperature maximises the
     likelihood of the phases of the synchronizer. That of the intervals is the lowest at which nine
     tenths of these phases are inside, raised for new people.
 
     Parameters
     ----------
     reference_of : callable
-        The `Reference` of a mean performance (P, n_features).
-    performances : list of ndarray (n_frames_i, n_features)
+        The `Reference` of a mean trial (P, n_features).
+    trials : list of ndarray (n_frames_i, n_features)
     warped : ndarray, shape (n_sequences, P, n_features)
-        The synchronised performances.
+        The synchronised trials.
     times : ndarray, shape (n_sequences, P)
         ``tau`` of each.
     progress : Progress
@@ -566,13 +566,13 @@ def calibrate(reference_of, performances, warped, times, progress):
     -------
     temperature, typical_cost, interval_temperature : float
     """
-    n, total = len(performances), warped.sum(axis=0, dtype=np.float64)
-    chosen = np.unique(np.linspace(0, n - 1, _MAX_PERFORMANCES).round().astype(np.intp))
+    n, total = len(trials), warped.sum(axis=0, dtype=np.float64)
+    chosen = np.unique(np.linspace(0, n - 1, _MAX_TRIALS).round().astype(np.intp))
     (scores, shares), largest = np.zeros((2, len(_TEMPERATURES))), []
     # Of a constant mean all costs are 0, in any unit.
     whole = reference_of(total / n)
     energy = float(np.square(whole.moving).sum(axis=1).mean()) or 1.0
-    # Copies of one performance have no costs but rounding, and nor has a mean that stands still.
+    # Copies of one trial have no costs but rounding, and nor has a mean that stands still.
     least = _MIN_PROBABILITY * energy
     standing = max(cost_of_standing(whole), least) if whole.cyclic else np.inf
     if n == 1:
@@ -581,7 +581,7 @@ def calibrate(reference_of, performances, warped, times, progress):
     step = progress.stage("calibrating", len(chosen))
     for i in chosen:
         reference = reference_of((total - warped[i]) / (n - 1))
-        costs, truth, largest_cost = _match_live(reference, performances[i], times[i])
+        costs, truth, largest_cost = _match_live(reference, trials[i], times[i])
         largest.append(largest_cost)
         subframes, last = reference.trellis.table.subframes, reference.n_frames - 1
         phases, right_phases = np.minimum(costs.argmin(axis=1) / subframes, last), truth / subframes
@@ -608,12 +608,12 @@ def calibrate(reference_of, performances, warped, times, progress):
 
 
 def cost_of_standing(reference):
-    """The mean cost of a sample while standing still, in the posture of a cycle that costs least.
+    """The mean cost of a sample while standing still, in the pose of a cycle that costs least.
 
     The first half of a cycle is left out.
     """
-    postures = reference.postures[:: max(1, len(reference.postures) // _POSTURES)]
-    samples = reference.features.compare(np.zeros_like(postures), postures)
+    poses = reference.poses[:: max(1, len(reference.poses) // _POSES)]
+    samples = reference.features.compare(np.zeros_like(poses), poses)
     live, costs = reference.begin(len(samples)), []
     for _ in range(reference.n_frames):
         live.advance(samples)
@@ -622,20 +622,20 @@ def cost_of_standing(reference):
     return float((costs[-1] - costs[-1 - half]).min() / half)
 
 
-def _match_live(reference, performance, times):
+def _match_live(reference, trial, times):
     """Path costs at even moments, the true positions there, and the largest mean cost.
 
     The costs are above the least of their moment, in single precision. A cycle is repeated, and
     the first time is left out.
     """
-    duration, last, first, stop = len(performance) - 1, reference.n_frames - 1, 0, 1
+    duration, last, first, stop = len(trial) - 1, reference.n_frames - 1, 0, 1
     if reference.cyclic:
         first, stop = 1, _REPEATED
-        performance = np.concatenate([performance[:-1]] * (stop - 1) + [performance])
+        trial = np.concatenate([trial[:-1]] * (stop - 1) + [trial])
     moments = np.arange(0, stop * duration * (1 + 1e-9), reference.step) / duration
-    samples = sample_at([performance], moments[np.newaxis] * last, stop * last + 1)[0]
-    postures = reference.unit(samples)
-    base = reference.features.compare(causal_velocity(postures, 1, reference.width), postures)
+    samples = sample_at([trial], moments[np.newaxis] * last, stop * last + 1)[0]
+    poses = reference.unit(samples)
+    base = reference.features.compare(causal_velocity(poses, 1, reference.width), poses)
     live, costs, total = reference.begin(), [], 0.0
     mean_cost = largest = 0.0
     counted = np.flatnonzero(moments >= first)
@@ -671,12 +671,12 @@ def closed(cycles):
 
 
 def check_cycles(mean):
-    """Refuse a mean performance (P, n_features) that does not end where it begins."""
+    """Refuse a mean trial (P, n_features) that does not end where it begins."""
     size = np.sqrt(np.square(mean - mean.mean(axis=0)).sum(axis=1).mean())
     apart = np.linalg.norm(mean[-1] - mean[0])
     if apart > _APART * size:
         raise ValueError(
-            f"With cyclic=True performances are cycles, each ends where it begins; but the mean of "
+            f"With cyclic=True trials are cycles, each ends where it begins; but the mean of "
             f"these ends {apart / size:.1f} times its root mean square deviation away from its "
             f"first frame, and {_APART:g} is the limit. Cut takes with CycleSegmenter, or set "
             "cyclic=False for a movement that is done once."

@@ -16,8 +16,8 @@ from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS, check_facts, facts_of
 from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude
 from ..inputs.recorded import warn_of_rows
-from ..inputs.tables import as_pandas, labels_of, name_performance
-from ..inputs.types import Indexed, Labels, NumbersLike, PerformancesLike, RandomState, ValuesLike
+from ..inputs.tables import as_pandas, labels_of, name_trial
+from ..inputs.types import Indexed, Labels, NumbersLike, RandomState, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import check_match
@@ -39,33 +39,33 @@ __all__ = [
 class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """Track a body that is partly hidden, by the mean of its action and the variation of people.
 
-    Given the phase p of the action, a posture is ``mean(p) + deviation``, and an observation
-    ``y = H posture + b + noise``.
+    Given the phase p of the action, a pose is ``mean(p) + deviation``, and an observation
+    ``y = H pose + b + noise``.
 
-    1. The mean is that of the synchronised training performances. Deviations are those from the
+    1. The mean is that of the synchronised training trials. Deviations are those from the
        mean of the other groups, so that they are those of a new person.
     2. Deviations are a Matern-3/2 process in time, as a state-space model, with one length scale
        and a covariance of the features that is shrunk half-way to its diagonal. A Kalman filter
        estimates them; hidden features are left out of the observation.
     3. A Rao-Blackwellised particle filter estimates the phase and its rate. The log rate is an
-       Ornstein-Uhlenbeck process with the spread and the memory of the training performances. All
+       Ornstein-Uhlenbeck process with the spread and the memory of the training trials. All
        particles share one Kalman gain.
     4. The weights are likelihoods of causal velocities, compared with those of the mean along the
        path of the particle. The style of a person persists, so frames are not independent:
-       log-likelihoods of postures are not used, and those of velocities are divided by
+       log-likelihoods of poses are not used, and those of velocities are divided by
        ``tempering``.
     5. A second Kalman filter knows no phase: deviations are those from the mean of all frames. Both
        estimates are multiplied as densities, each to the power of its weight. The weights are 3 to
        1, divided by the mean variance of each estimate. The covariance of either is larger by its
        evidence, the average normalised innovation squared (NIS), where that is above 1.
-    6. If the average NIS of velocities, or of postures about the mean, exceeds its limit, the phase
+    6. If the average NIS of velocities, or of poses about the mean, exceeds its limit, the phase
        is lost: particles are spread over the whole clock, until they agree with the observations.
        At the end of a movement restart times are exponential.
 
     Parameters
     ----------
     synchronizer : synchronizer, default=None
-        Synchronises the training performances; a clone of it is fitted. None is
+        Synchronises the training trials; a clone of it is fitted. None is
         `DenseSynchronizer()`.
     n_particles : int, default=500
         Particles of phase and rate.
@@ -77,8 +77,8 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     tempering : float, default=10.0
         Divides the log-likelihood of the velocities of every hundredth of the mean duration.
     frame_rate : float, default=None
-        Frames a second of the training performances. Times are then in seconds; without it
-        in frames of the training performances.
+        Frames a second of the training trials. Times are then in seconds; without it
+        in frames of the training trials.
     random_state : int, RandomState instance or None, default=0
         Determines the seed that ``fit`` draws. Every take begins with this seed, so that equal
         observations have equal results, alone or among other takes.
@@ -86,27 +86,27 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     Attributes
     ----------
     mean_ : ndarray, shape (P, n_features)
-        The mean performance.
+        The mean trial.
     n_frames_ : int
         ``P``, frames of the clock.
     duration_ : float
-        Mean time from the first frame of a training performance to its last, in frames: the mean
+        Mean time from the first frame of a training trial to its last, in frames: the mean
         of ``n_frames - 1``.
     synchronizer_ : synchronizer
         The fitted synchronizer.
     covariance_ : ndarray, shape (n_features, n_features)
         Of deviations from the mean.
     length_scale_ : float
-        Of the Matern-3/2 process, in frames of the training performances.
+        Of the Matern-3/2 process, in frames of the training trials.
     rate_spread_ : float
         Standard deviation of the log rate.
     rate_memory_ : float
-        Frames of the training performances after which its correlation is 1/e.
+        Frames of the training trials after which its correlation is 1/e.
     surprise_limit_ : float
         Limit of the NIS of velocities, averaged over 9 % of the mean duration; 1 is expected. It is
-        four times as far from 1 as the largest of the training performances.
+        four times as far from 1 as the largest of the training trials.
     departure_limit_ : float
-        Limit of the NIS of postures about the mean: at least 9, three standard deviations.
+        Limit of the NIS of poses about the mean: at least 9, three standard deviations.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -114,21 +114,21 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
 
     See Also
     --------
-    DirectionCosines : Makes postures of joint positions, which all people share.
+    DirectionCosines : Makes poses of joint positions, which all people share.
     JointNoise : Noise of joint positions, as it shows in them.
-    DenseSynchronizer : Puts the training performances on one clock.
+    DenseSynchronizer : Puts the training trials on one clock.
 
     Notes
     -----
     Without observations (all NaN) the movement goes on at the mean pace, and the covariance grows.
     A frame is ignored if its NIS exceeds 100, and ten times the largest NIS of the training
-    performances; after several such frames the phase is lost. A take may begin at any phase; most
+    trials; after several such frames the phase is lost. A take may begin at any phase; most
     particles begin at the first frame. After a gap in time as long as the movement, particles are
     at the end, or have restarted.
 
-    Standing still in a posture of the action, or doing it backwards, is not called lost: the
-    postures are possible, and the velocities not improbable enough. Takes of another action are
-    drawn to postures of this one, with wider bands. Part of their frames is called lost: of people
+    Standing still in a pose of the action, or doing it backwards, is not called lost: the
+    poses are possible, and the velocities not improbable enough. Takes of another action are
+    drawn to poses of this one, with wider bands. Part of their frames is called lost: of people
     14 to 74 %, the less the noisier the joints.
 
     Examples
@@ -148,14 +148,14 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     >>> track = tracker.track(hidden)
     >>> track
     Track(60 frames of 2 features, 0 of them lost)
-    >>> bool(np.abs(track.postures - take).max() < 0.1)
+    >>> bool(np.abs(track.poses - take).max() < 0.1)
     True
 
     Frame by frame the result is the same.
 
     >>> for frame in hidden[:30]:
     ...     now = tracker.step(frame)
-    >>> bool((now.postures == track.postures[29]).all())
+    >>> bool((now.poses == track.poses[29]).all())
     True
     """
 
@@ -187,18 +187,18 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         self.random_state = random_state
 
     @validated
-    def fit(self, X: PerformancesLike, y: object = None, groups: Labels | None = None) -> Self:
+    def fit(self, X: TrialsLike, y: object = None, groups: Labels | None = None) -> Self:
         """Learn the mean, the deviations of people, and their rates.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : ignored
             Present for API consistency.
         groups : array-like, shape (n_sequences,), default=None
-            The subject of each performance: deviations are from the mean of other groups. By
-            default every performance is a group of its own.
+            The subject of each trial: deviations are from the mean of other groups. By
+            default every trial is a group of its own.
 
         Returns
         -------
@@ -208,14 +208,14 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         Raises
         ------
         ValueError
-            If the input breaks the contract, there is only one performance or one group, or not one
+            If the input breaks the contract, there is only one trial or one group, or not one
             group for each.
         """
-        performances = self._check_training_set(X)
-        n = len(performances)
+        trials = self._check_training_set(X)
+        n = len(trials)
         if n < 2:
             raise ValueError(
-                "A tracker learns how people vary from at least 2 performances, got n_samples = 1."
+                "A tracker learns how people vary from at least 2 trials, got n_samples = 1."
             )
         codes, _ = encode_groups(groups, n, at_least=2, sort=True)
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
@@ -224,8 +224,8 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
                 sync.fit(X)
             match = sync.match(X)
             check_match(match, n, sync.n_frames_, type(sync).__name__)
-            warped = match.warp(performances)
-            durations = np.array([len(x) for x in performances], dtype=np.float64) - 1
+            warped = match.warp(trials)
+            durations = np.array([len(x) for x in trials], dtype=np.float64) - 1
             clock = Clock(int(sync.n_frames_) - 1.0, float(durations.mean()))
             rates = clock.duration / durations[:, np.newaxis] / match.rates
             warped = warped.astype(np.float64)
@@ -239,7 +239,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         self.synchronizer_, self.n_frames_ = sync, int(sync.n_frames_)
         self.duration_ = clock.duration
-        self.mean_ = model.mean.astype(performances[0].dtype)
+        self.mean_ = model.mean.astype(trials[0].dtype)
         self.covariance_ = model.process.covariance
         self.length_scale_ = float(np.sqrt(3) / model.process.decay)
         self.rate_spread_, self.rate_memory_ = model.rates
@@ -249,11 +249,11 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
 
     def track(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         times: Indexed[ValuesLike] | ValuesLike | None = None,
         projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
     ) -> Any:
-        """Track takes: postures and phases at every frame, given the observations up to it.
+        """Track takes: poses and phases at every frame, given the observations up to it.
 
         Parameters
         ----------
@@ -262,9 +262,9 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
             array are takes.
         times : array-like, shape (n_frames,), or a list of them, default=None
             Times of the frames, increasing: in seconds with a ``frame_rate``, else in frames of
-            the training performances. None: one frame of these after the other.
+            the training trials. None: one frame of these after the other.
         projection : array-like (n_observed, n_features) or (matrix, offset), default=None
-            The observation ``matrix @ posture + offset`` of a posture. None: all of it.
+            The observation ``matrix @ pose + offset`` of a pose. None: all of it.
 
         Returns
         -------
@@ -281,11 +281,11 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
 
     def smooth(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         times: Indexed[ValuesLike] | ValuesLike | None = None,
         projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
     ) -> Any:
-        """Smooth whole takes: postures and phases at every frame, given all observations.
+        """Smooth whole takes: poses and phases at every frame, given all observations.
 
         20 paths of phases are drawn by forward filtering and backward simulation, and a
         Rauch-Tung-Striebel smoother in the form of Bryson and Frazier estimates the deviations
@@ -299,7 +299,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         times : array-like, shape (n_frames,), or a list of them, default=None
             Times of the frames, as for ``track``.
         projection : array-like (n_observed, n_features) or (matrix, offset), default=None
-            The observation of a posture, as for ``track``.
+            The observation of a pose, as for ``track``.
 
         Returns
         -------
@@ -338,7 +338,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         Returns
         -------
         Track
-            Of this frame, as from ``track``: ``postures`` (n_features,), ``covariances``
+            Of this frame, as from ``track``: ``poses`` (n_features,), ``covariances``
             (n_features, n_features), numbers.
 
         Raises
@@ -365,7 +365,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         return tags
 
     def _noise_of(self, mean):
-        """The covariance of the noise of a whole posture of the mean performance."""
+        """The covariance of the noise of a whole pose of the mean trial."""
         if isinstance(self.noise, JointNoise):
             return self.noise.covariance(mean)
         return self.noise**2 * np.eye(mean.shape[1])
@@ -392,7 +392,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
             raise ValueError("Found 0 takes, at least 1 is needed.")
         labels = ["The take"]
         if not single:
-            labels = [name_performance(*pair) for pair in enumerate(labels_of(sequences)[0])]
+            labels = [name_trial(*pair) for pair in enumerate(labels_of(sequences)[0])]
         # What a projection shows has units and axes of its own.
         which = [
             *(TIMELESS if projection is None else ()),
@@ -418,7 +418,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
 
 
 class Observer(NamedTuple):
-    """``y = matrix @ posture + noise``.
+    """``y = matrix @ pose + noise``.
 
     Parameters
     ----------

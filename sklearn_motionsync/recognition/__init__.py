@@ -1,4 +1,4 @@
-"""Recognition of actions: distances between performances, and a classifier."""
+"""Recognition of actions: distances between trials, and a classifier."""
 
 from .classifier import ActionClassifier
 from .distances import synchronization_distances

@@ -1,4 +1,4 @@
-"""ActionClassifier: which of several actions a performance is, and whether it is any of them."""
+"""ActionClassifier: which of several actions a trial is, and whether it is any of them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.types import Cost, Labels, PerformancesLike, ValuesLike
+from ..inputs.types import Cost, Labels, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.costs import COSTS
 from ..matching.counting import first_largest
@@ -69,7 +69,7 @@ class ActionClassifier(
 
     Parameters
     ----------
-    costs : str or list of str, default=("velocity", "elastic", "posture")
+    costs : str or list of str, default=("velocity", "elastic", "pose")
         The costs of the distances, each once, out of these three. May be empty with
         ``summaries``: then nothing is warped.
     C : float, default=10
@@ -79,16 +79,16 @@ class ActionClassifier(
     summaries : bool, default=True
         Whether summaries of every feature make kernels, too: of its values, and of its changes.
     n_landmarks : int or None, default=250
-        If there are more than twice as many performances, they are compared with so many of them
+        If there are more than twice as many trials, they are compared with so many of them
         only, chosen evenly from all classes and groups (Nyström's method). None compares all.
     n_frames : int, default=50
         ``P``, frames of the common clock. Time grows with its square.
     reject_below : float, "auto" or None, default=None
-        Performances whose largest decision value is below get ``unknown_label``; None rejects
+        Trials whose largest decision value is below get ``unknown_label``; None rejects
         nothing. ``"auto"`` is ``threshold_at(0.95)``. ``fit`` does not use it: it can be set
         afterwards.
     unknown_label : label, default=None
-        The label of rejected performances, which is none of the classes; by default "unknown" among
+        The label of rejected trials, which is none of the classes; by default "unknown" among
         text, -1 among numbers, NaT among dates.
     n_jobs : int, default=None
         How many jobs share the comparisons, in ``fit`` and after it. None means 1 unless in a
@@ -101,19 +101,19 @@ class ActionClassifier(
     classes_ : ndarray, shape (n_classes,)
         The classes, sorted.
     landmarks_ : ndarray of int, shape (n_landmarks,)
-        The training performances that others are compared with: their indices, rising.
+        The training trials that others are compared with: their indices, rising.
     weights_ : ndarray, shape (n_kernels,)
-        The weights of shape, postures, summaries and changes, of those that ``costs`` and
+        The weights of shape, poses, summaries and changes, of those that ``costs`` and
         ``summaries`` name, in this order. They sum to 1.
     temperature_ : float
-        The factor of decision values in probabilities, estimated from held-out performances.
+        The factor of decision values in probabilities, estimated from held-out trials.
     held_out_ : ndarray, shape (n_sequences,)
-        The largest decision value of each training performance when it and all of its group
+        The largest decision value of each training trial when it and all of its group
         (without groups a fifth of every class) are held out; NaN where one class is left.
     held_out_gain_ : float
         What decision values gain from the fold that was held out, extrapolated from another: with
         ``G`` folds, usually 5, ``(G - 2) / G`` of what a second held-out fold takes from
-        ``held_out_``, in the median of performances that were given their class.
+        ``held_out_``, in the median of trials that were given their class.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -122,19 +122,19 @@ class ActionClassifier(
     See Also
     --------
     synchronization_distances : One of the distances, for neighbours, clusters and maps.
-    ActionDetector : Whether performances are one action, fitted on that action alone.
-    find_departures : Where performances depart from the class they were given.
+    ActionDetector : Whether trials are one action, fitted on that action alone.
+    find_departures : Where trials depart from the class they were given.
 
     Notes
     -----
     The similarity of two trials is a weighted mean of four kernels. The first is that of shape, by
     the synchronisation distances of velocities, each divided by its own energy; the second that of
-    postures. The third compares mean, standard deviation, minimum, maximum, start and end of every
+    poses. The third compares mean, standard deviation, minimum, maximum, start and end of every
     feature. The fourth compares its changes over 4 and 16 % of the clock: minimum, maximum, and for
     how much of the clock they exceed levels. Summaries are not warped. The weight of a kernel,
     ``weights_``, is the sixth power of its alignment with the classes, over pairs of different
     groups. A multinomial logistic regression with this kernel separates the classes. Trials are not
-    warped to the template of a class: that makes unknown movements resemble it.
+    warped to the pattern of a class: that makes unknown movements resemble it.
 
     Two classes may be a movement done right and done wrong. Give ``groups`` then: what tells people
     apart gets little weight.
@@ -145,7 +145,7 @@ class ActionClassifier(
     and thresholds are then those of new people. Under metadata routing
     ``set_fit_request(groups=True)``; otherwise a pipeline takes ``actionclassifier__groups``.
 
-    Time and memory of a fit grow with the square of the number of performances where all are
+    Time and memory of a fit grow with the square of the number of trials where all are
     compared, and with their number where landmarks are; those of a prediction with ``landmarks_``.
     """
 
@@ -168,7 +168,7 @@ class ActionClassifier(
 
     def __init__(
         self,
-        costs: Cost | Sequence[Cost] = ("velocity", "elastic", "posture"),
+        costs: Cost | Sequence[Cost] = ("velocity", "elastic", "pose"),
         *,
         C: float = 10,
         gamma: float = 1,
@@ -192,17 +192,17 @@ class ActionClassifier(
         self.verbose = verbose
 
     @validated
-    def fit(self, X: PerformancesLike, y: Labels, groups: Labels | None = None) -> Self:
+    def fit(self, X: TrialsLike, y: Labels, groups: Labels | None = None) -> Self:
         """Fit the kernel, the regression and the temperature.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : array-like, shape (n_sequences,)
-            The class of each performance.
+            The class of each trial.
         groups : array-like, shape (n_sequences,), default=None
-            The subject of each performance, or what else makes performances resemble each other.
+            The subject of each trial, or what else makes trials resemble each other.
 
         Returns
         -------
@@ -213,19 +213,19 @@ class ActionClassifier(
         ------
         ValueError
             If the input breaks the contract, there are not two classes, there is not a class or
-            group for each performance, or costs are unknown.
+            group for each trial, or costs are unknown.
         """
         kernel = MotionKernel(
             self._comparisons(), self.gamma, self.summaries, n_frames=int(self.n_frames)
         )
-        performances = self._check_training_set(X)
-        classes, codes = encode_classes(y, performances, type(self).__name__)
+        trials = self._check_training_set(X)
+        classes, codes = encode_classes(y, trials, type(self).__name__)
         if groups is not None:
-            groups, _ = encode_groups(groups, len(performances), at_least=2)
+            groups, _ = encode_groups(groups, len(trials), at_least=2)
         landmarks = choose_landmarks(codes, groups, self.n_landmarks)
         with self._progress(fits=True) as progress:
             matrix = kernel.fit(
-                performances, landmarks, codes, groups, n_jobs=self.n_jobs, progress=progress
+                trials, landmarks, codes, groups, n_jobs=self.n_jobs, progress=progress
             )
             folds = assign_folds(codes, groups)
             fit_in_portion = partial(fit_regression, self.C, folds, landmarks)
@@ -236,16 +236,16 @@ class ActionClassifier(
         self.held_out_, self.held_out_gain_ = result.held_out, result.gain
         self._kernel, self.weights_ = kernel, kernel.weights
         # Copies, which do not change with the user's arrays.
-        self._training = [np.array(x) for x in performances], codes, groups
+        self._training = [np.array(x) for x in trials], codes, groups
         return self
 
-    def predict(self, X: PerformancesLike) -> np.ndarray:
-        """The class of each performance.
+    def predict(self, X: TrialsLike) -> np.ndarray:
+        """The class of each trial.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
@@ -263,19 +263,17 @@ class ActionClassifier(
         codes[decisions.max(axis=1) < threshold] = len(self.classes_)
         return add_unknown_label(self.classes_, self.unknown_label)[codes]
 
-    def score(
-        self, X: PerformancesLike, y: Labels, sample_weight: ValuesLike | None = None
-    ) -> float:
-        """Share of performances that are given their class.
+    def score(self, X: TrialsLike, y: Labels, sample_weight: ValuesLike | None = None) -> float:
+        """Share of trials that are given their class.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : array-like, shape (n_sequences,)
             Their classes.
         sample_weight : array-like, shape (n_sequences,), default=None
-            The weight of each performance; by default all are equal.
+            The weight of each trial; by default all are equal.
 
         Returns
         -------
@@ -284,13 +282,13 @@ class ActionClassifier(
         """
         return float(super().score(X, y, sample_weight))
 
-    def predict_proba(self, X: PerformancesLike) -> np.ndarray:
-        """The probability of each class, given that a performance is one of them.
+    def predict_proba(self, X: TrialsLike) -> np.ndarray:
+        """The probability of each class, given that a trial is one of them.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
@@ -300,13 +298,13 @@ class ActionClassifier(
         decisions = self._decisions(X)
         return softmax(self.temperature_ * decisions, axis=1)
 
-    def decision_function(self, X: PerformancesLike) -> np.ndarray:
+    def decision_function(self, X: TrialsLike) -> np.ndarray:
         """Decision values of the classes.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
@@ -316,28 +314,28 @@ class ActionClassifier(
         decisions = self._decisions(X)
         return decisions if len(self.classes_) > 2 else decisions[:, 1] - decisions[:, 0]
 
-    def score_samples(self, X: PerformancesLike) -> np.ndarray:
-        """The largest decision value of performances: their similarity to any class.
+    def score_samples(self, X: TrialsLike) -> np.ndarray:
+        """The largest decision value of trials: their similarity to any class.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            ``reject_below`` rejects performances below it.
+            ``reject_below`` rejects trials below it.
         """
         return self._decisions(X).max(axis=1)
 
     def threshold_at(self, coverage: float) -> float:
-        """The ``reject_below`` that keeps a share of performances of the known actions.
+        """The ``reject_below`` that keeps a share of trials of the known actions.
 
         Parameters
         ----------
         coverage : float
-            The share, between 0 and 1, of performances; of new people if groups were given.
+            The share, between 0 and 1, of trials; of new people if groups were given.
 
         Returns
         -------
@@ -348,7 +346,7 @@ class ActionClassifier(
         Raises
         ------
         ValueError
-            If it is no share, or no performance could be held out.
+            If it is no share, or no trial could be held out.
         """
         check_is_fitted(self, "classes_")
         if not (isinstance(coverage, Real) and 0 < coverage < 1):
@@ -356,15 +354,15 @@ class ActionClassifier(
         known = self.held_out_[np.isfinite(self.held_out_)]
         if not len(known):
             raise ValueError(
-                "There is no threshold, as no performance could be held out: give at least two "
-                "performances, and two groups, of two classes, or a number as reject_below."
+                "There is no threshold, as no trial could be held out: give at least two "
+                "trials, and two groups, of two classes, or a number as reject_below."
             )
         return float(np.quantile(known, 1 - coverage) + self.held_out_gain_)
 
     def model_of(self, label: Hashable) -> Pipeline:
         """Fit a model of a class, to explain a prediction.
 
-        It does not decide: performances of other classes that are synchronised to its pattern
+        It does not decide: trials of other classes that are synchronised to its pattern
         resemble it.
 
         Parameters
@@ -375,15 +373,15 @@ class ActionClassifier(
         Returns
         -------
         Pipeline
-            A `DenseSynchronizer` and an `ActionModel`, fitted on the performances of the class.
+            A `DenseSynchronizer` and an `ActionModel`, fitted on the trials of the class.
 
         Raises
         ------
         ValueError
-            If there is no such class, or it has one performance only.
+            If there is no such class, or it has one trial only.
         """
         check_is_fitted(self, "classes_")
-        performances, codes, groups = self._training
+        trials, codes, groups = self._training
         match = np.flatnonzero(self.classes_ == label)
         if not len(match):
             raise ValueError(
@@ -391,11 +389,9 @@ class ActionClassifier(
             )
         members = np.flatnonzero(codes == match[0])
         if len(members) < 2:
-            raise ValueError(
-                f"The class {label!r} has one performance: a model needs at least two."
-            )
-        X: PerformancesLike
-        X = arrays = [performances[i] for i in members]
+            raise ValueError(f"The class {label!r} has one trial: a model needs at least two.")
+        X: TrialsLike
+        X = arrays = [trials[i] for i in members]
         names = getattr(self, "feature_names_in_", None)
         if self._fitted_on_rows:
             X = np.stack([x[:, 0] for x in arrays])
@@ -425,12 +421,12 @@ class ActionClassifier(
                 f"costs must be some of {list(COSTS)}, each once, and at least one of them without "
                 f"summaries; got {self.costs!r}."
             )
-        # Postures keep the unit of the training set. A kernel needs no more than single precision:
+        # Poses keep the unit of the training set. A kernel needs no more than single precision:
         # six digits of a distance.
         return [
             PairwiseDistance(
                 cost,
-                normalize=cost != "posture",
+                normalize=cost != "pose",
                 n_frames=int(self.n_frames),
                 max_offset=_MAX_OFFSET,
                 dtype=np.float32,
@@ -439,16 +435,16 @@ class ActionClassifier(
         ]
 
     def _decisions(self, X):
-        """Decision values of performances: (n_sequences, n_classes)."""
+        """Decision values of trials: (n_sequences, n_classes)."""
         check_is_fitted(self, "classes_")
-        performances = self.check_performances(X)
+        trials = self.check_trials(X)
         with self._progress(fits=False) as progress:
-            kernel = self._kernel(performances, n_jobs=self.n_jobs, progress=progress)
+            kernel = self._kernel(trials, n_jobs=self.n_jobs, progress=progress)
         return decision_values(kernel, *self._regression)
 
 
 def choose_landmarks(codes, groups, n_landmarks):
-    """Performances of all classes, and of all groups of each, in numbers as even as possible.
+    """Trials of all classes, and of all groups of each, in numbers as even as possible.
 
     Parameters
     ----------
@@ -466,7 +462,7 @@ def choose_landmarks(codes, groups, n_landmarks):
     if n_landmarks is None or n <= 2 * n_landmarks:
         return np.arange(n)
     groups = np.zeros(n, dtype=np.intp) if groups is None else groups
-    # Multiples of the golden ratio, modulo 1, are evenly spread over the performances of a group,
+    # Multiples of the golden ratio, modulo 1, are evenly spread over the trials of a group,
     # and over the groups of a class.
     spread = (np.arange(n) * _GOLDEN) % 1
     in_group = _ranks(codes * (groups.max() + 1) + groups, spread)

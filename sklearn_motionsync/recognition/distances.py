@@ -1,7 +1,7 @@
 """synchronization_distances: the matrix of Eq. 12, whose pairs do not depend on each other.
 
 In a fit distances are rounded as the tile they are computed in. Here no distance depends on the
-other performances, not in its last bit: every pair has matrix products of its own, of one size, and
+other trials, not in its last bit: every pair has matrix products of its own, of one size, and
 all else is done element by element.
 """
 
@@ -15,8 +15,8 @@ import numpy as np
 from sklearn.base import BaseEstimator
 from sklearn.utils._param_validation import Interval, StrOptions
 
-from ..inputs.types import Cost, PerformancesLike
-from ..inputs.validation import SequenceLevelMixin, check_performances
+from ..inputs.types import Cost, TrialsLike
+from ..inputs.validation import SequenceLevelMixin, check_trials
 from ..inputs.wording import counted
 from ..matching.costs import COSTS
 from ..matching.matcher import cost_features
@@ -58,8 +58,8 @@ _PORTION_BLOCKS = 32
     }
 )
 def synchronization_distances(
-    X: PerformancesLike,
-    Y: PerformancesLike | None = None,
+    X: TrialsLike,
+    Y: TrialsLike | None = None,
     *,
     cost: Cost = "elastic",
     normalize: bool = True,
@@ -72,32 +72,32 @@ def synchronization_distances(
     n_jobs: int | None = None,
     verbose: int = 0,
 ) -> np.ndarray:
-    """Synchronisation distances between all pairs of performances (Eq. 12).
+    """Synchronisation distances between all pairs of trials (Eq. 12).
 
-    A distance is the difference of two performances after one is warped to the other: for nearest
+    A distance is the difference of two trials after one is warped to the other: for nearest
     neighbours, kernels, clusters and embeddings. It depends on the pair alone, to the last bit,
-    not on the other performances.
+    not on the other trials.
 
     Parameters
     ----------
     X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-        Performances; the rows of a 2-D array are univariate ones.
+        Trials; the rows of a 2-D array are univariate ones.
     Y : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array, default=None
-        Other performances, with the same features. By default X, with 0 on the diagonal.
-    cost : {"elastic", "velocity", "posture"}, default="elastic"
+        Other trials, with the same features. By default X, with 0 on the diagonal.
+    cost : {"elastic", "velocity", "pose"}, default="elastic"
         The features that are compared, as in `DenseSynchronizer`.
     normalize : bool, default=True
-        Whether the compared features of each performance are divided by their own root mean
-        square, which removes amplitude and unit. A performance that stands still is
+        Whether the compared features of each trial are divided by their own root mean
+        square, which removes amplitude and unit. A trial that stands still is
         ``2 * n_frames`` away from any that moves.
     symmetric : bool, default=True
-        Whether to average both directions. Otherwise the rows are the performances whose
+        Whether to average both directions. Otherwise the rows are the trials whose
         clock is kept, ``n`` of ``D_{n,m}``, and the columns those that are warped, ``m``.
     n_frames : int, default=50
         ``P``, frames of the common clock. The distance is a sum over them.
     velocity_smoothing : float, default=0.06
         Standard deviation of the Gaussian under which velocities are estimated, as a share of the
-        performance.
+        trial.
     max_offset : float, default=0.25
         Largest offset, as a share of the clock, in [0, 1].
     smoothness : float, default=0.003
@@ -116,13 +116,13 @@ def synchronization_distances(
     -------
     ndarray, shape (n_X, n_Y)
         0 or more, in double precision: squares of the features, summed over the clock, and ``mu``
-        times the penalties of the path. With ``normalize`` uncorrelated performances are
+        times the penalties of the path. With ``normalize`` uncorrelated trials are
         ``2 * n_frames`` apart, and opposite ones up to twice that.
 
     Raises
     ------
     ValueError
-        If the input breaks the contract, the performances of Y have other features than X, or a
+        If the input breaks the contract, the trials of Y have other features than X, or a
         parameter is invalid.
 
     See Also
@@ -131,7 +131,7 @@ def synchronization_distances(
 
     Examples
     --------
-    Two movements, each done in three ways, and the nearest other performance of each.
+    Two movements, each done in three ways, and the nearest other trial of each.
 
     >>> import numpy as np
     >>> from sklearn_motionsync import synchronization_distances
@@ -152,10 +152,10 @@ def synchronization_distances(
     ['slow', 'fast', 'fast']
     """
     reader = type("synchronization_distances", (SequenceLevelMixin, BaseEstimator), {})()
-    bases, moving = check_performances(reader, X, reset=True, level="sequence"), None
+    bases, moving = check_trials(reader, X, reset=True, level="sequence"), None
     if Y is not None:
         on_rows = bases.kind == "rows"
-        moving = check_performances(reader, Y, reset=False, level="sequence", on_rows=on_rows)
+        moving = check_trials(reader, Y, reset=False, level="sequence", on_rows=on_rows)
     comparison = PairwiseDistance(
         cost,
         normalize=normalize,
@@ -177,13 +177,13 @@ def synchronization_distances(
     )
 
 
-def normalise_time(performances, n_frames):
-    """Performances linearly normalised in time (Eq. 7), in double precision."""
-    return normalise([np.asarray(x, dtype=np.float64) for x in performances], n_frames)
+def normalise_time(trials, n_frames):
+    """Trials linearly normalised in time (Eq. 7), in double precision."""
+    return normalise([np.asarray(x, dtype=np.float64) for x in trials], n_frames)
 
 
 def pairwise_distances(comparison, X, Y=None, *, symmetric=True, n_jobs=None, progress, name=""):
-    """Distances between performances, given the features that are compared.
+    """Distances between trials, given the features that are compared.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def pairwise_distances(comparison, X, Y=None, *, symmetric=True, n_jobs=None, pr
 def _directed(comparison, bases, moving, *, n_jobs, progress, name):
     pairs = blocks_of_pairs(len(bases), len(moving))
     portions = [(pairs[i : i + _PORTION_BLOCKS],) for i in range(0, len(pairs), _PORTION_BLOCKS)]
-    stage = f"comparing {len(bases)} with {counted(len(moving), 'performance')}{name}"
+    stage = f"comparing {len(bases)} with {counted(len(moving), 'trial')}{name}"
     step = progress.stage(stage, len(portions))
     out = np.empty((len(bases), len(moving)))
     common = ((comparison, bases, moving),)
@@ -230,14 +230,14 @@ def _blocks(shared, blocks):
 
 
 class PairwiseDistance:
-    """The synchronisation distance of performances on the clock, under one cost.
+    """The synchronisation distance of trials on the clock, under one cost.
 
     Parameters
     ----------
     cost : str
         A key of ``costs.COSTS``.
     normalize : bool
-        Whether the features of every performance are divided by their own root mean square.
+        Whether the features of every trial are divided by their own root mean square.
     n_frames : int
         Of the clock.
     max_offset : float
@@ -270,7 +270,7 @@ class PairwiseDistance:
         )
 
     def features(self, on_clock):
-        """Features of performances (n, P, n_features) on the clock: (n, P, n_compared)."""
+        """Features of trials (n, P, n_features) on the clock: (n, P, n_compared)."""
         on_clock = on_clock.astype(np.float64)
         size = np.abs(on_clock).max(axis=(1, 2), keepdims=True, initial=0)
         if self.normalize:
@@ -283,7 +283,7 @@ class PairwiseDistance:
         if not self.normalize:
             return features.astype(self.dtype, copy=False)
         energy = _energies(features)[:, np.newaxis, np.newaxis] / self.n_frames
-        # All energy of a performance that stands still is in a feature that is 0 in others.
+        # All energy of a trial that stands still is in a feature that is 0 in others.
         residue = np.broadcast_to(energy == 0, (*features.shape[:2], 1))
         features /= np.sqrt(np.where(energy > 0, energy, 1))
         return np.concatenate([features, residue], axis=2, dtype=self.dtype)
@@ -306,7 +306,7 @@ class PairwiseDistance:
 
 
 def _energies(features):
-    """``sum_p |x(p)|^2`` of every performance."""
+    """``sum_p |x(p)|^2`` of every trial."""
     flat = features.reshape(len(features), -1)
     return np.vecdot(flat, flat)
 

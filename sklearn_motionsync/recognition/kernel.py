@@ -1,4 +1,4 @@
-"""MotionKernel: how alike performances are, and the multinomial regression with it."""
+"""MotionKernel: how alike trials are, and the multinomial regression with it."""
 
 from typing import NamedTuple
 
@@ -29,11 +29,11 @@ __all__ = [
     "held_out_decisions",
 ]
 
-# The cost that compares postures; the others compare velocities.
-_POSTURE = "posture"
+# The cost that compares poses; the others compare velocities.
+_POSE = "pose"
 # Standard deviations below this share of the size of the data are rounding.
 _ROUNDING = 2.0**-44
-# Frames that are averaged for the start and the end of a performance.
+# Frames that are averaged for the start and the end of a trial.
 _N_END_FRAMES = 3
 # Changes are those over these shares of the clock before and after a frame.
 _REACHES = 0.04, 0.16
@@ -46,12 +46,12 @@ _POWER = 6
 class MotionKernel:
     """A weighted mean of kernels ``exp(-gamma D / median(D))``, medians over the training pairs.
 
-    There are up to four views of performances. `comparisons` of velocities make the first, those of
-    postures the second, each ``D`` a matrix of synchronisation distances. The third is of
+    There are up to four views of trials. `comparisons` of velocities make the first, those of
+    poses the second, each ``D`` a matrix of synchronisation distances. The third is of
     `summary_statistics`, the last of `change_extremes` and `change_shares`: squared Euclidean
     distances, in standard deviations of the training set. A view is the mean of its kernels.
 
-    Performances are compared with landmarks of the training set. If these are not all of it, the
+    Trials are compared with landmarks of the training set. If these are not all of it, the
     views are not added up, but stand side by side: each then has a regression of its own, which
     comes nearer to that of all pairs.
 
@@ -73,15 +73,15 @@ class MotionKernel:
     def __init__(self, comparisons, gamma, summaries, *, n_frames):
         self.comparisons, self.gamma, self.summaries = comparisons, gamma, summaries
         self.n_frames = n_frames
-        views = [int(c.cost == _POSTURE) for c in comparisons] + [2, 3, 3] * bool(summaries)
+        views = [int(c.cost == _POSE) for c in comparisons] + [2, 3, 3] * bool(summaries)
         self._views = np.unique(views, return_inverse=True)[1]
 
-    def fit(self, performances, landmarks, codes, groups=None, **jobs):
+    def fit(self, trials, landmarks, codes, groups=None, **jobs):
         """Estimate units, medians and weights from the training set, and return its kernel.
 
         Parameters
         ----------
-        performances : sequence of ndarray (n_frames_i, n_features)
+        trials : sequence of ndarray (n_frames_i, n_features)
         landmarks : ndarray of int, shape (n_landmarks,)
         codes : ndarray of int, shape (n,)
             Classes.
@@ -93,11 +93,11 @@ class MotionKernel:
         -------
         ndarray, shape (n, n), or (n, n_views * n_landmarks)
         """
-        frames = [x.astype(np.float64, copy=False) for x in performances]
+        frames = [x.astype(np.float64, copy=False) for x in trials]
         self._center = np.concatenate(frames).mean(axis=0)
         variances = [np.square(x - self._center).sum(axis=1).mean() for x in frames]
         self._unit = np.sqrt(np.mean(variances)) or 1.0
-        scaled = self._scale(performances)
+        scaled = self._scale(trials)
         on_clock = normalise_time(scaled, self.n_frames)
         features = [c.features(on_clock) for c in self.comparisons]
         self._features = [f[landmarks] for f in features]
@@ -132,9 +132,9 @@ class MotionKernel:
         self.weights = align_weights(views, codes, groups, landmarks)
         return self._combined(views)
 
-    def __call__(self, performances, **jobs):
-        """The kernel of other performances and the landmarks."""
-        scaled = self._scale(performances)
+    def __call__(self, trials, **jobs):
+        """The kernel of other trials and the landmarks."""
+        scaled = self._scale(trials)
         on_clock = normalise_time(scaled, self.n_frames)
         distances = [
             pairwise_distances(c, c.features(on_clock), known, name=f" by {c.cost}", **jobs)
@@ -152,13 +152,13 @@ class MotionKernel:
             ]
         return self._combined(self._as_views(distances))
 
-    def _scale(self, performances):
-        """Performances about the mean posture, in the unit of the training set."""
-        return [(x.astype(np.float64) - self._center) / self._unit for x in performances]
+    def _scale(self, trials):
+        """Trials about the mean pose, in the unit of the training set."""
+        return [(x.astype(np.float64) - self._center) / self._unit for x in trials]
 
     def _summarised(self, scaled, on_clock):
         """Statistics (n, n_statistics) of values, extremes of changes, and shares of the clock."""
-        # One performance at a time: no result depends on the others.
+        # One trial at a time: no result depends on the others.
         changes = [changes_of(x) for x in on_clock]
         units = self._change_units
         return [
@@ -224,17 +224,17 @@ def _centred(matrix):
 
 
 def summary_statistics(x):
-    """Mean, standard deviation, extremes and ends of a performance (n_frames, n_features)."""
+    """Mean, standard deviation, extremes and ends of a trial (n_frames, n_features)."""
     ends = x[:_N_END_FRAMES].mean(axis=0), x[-_N_END_FRAMES:].mean(axis=0)
     parts = [x.mean(axis=0), x.std(axis=0), x.min(axis=0), x.max(axis=0), *ends]
     return np.concatenate(parts)
 
 
 def changes_of(x):
-    """Changes of a performance (P, n_features) on the clock: (n_reaches, P, n_features).
+    """Changes of a trial (P, n_features) on the clock: (n_reaches, P, n_features).
 
     That at a frame is the value some frames later less that as many earlier. Before its start and
-    after its end a performance stands still.
+    after its end a trial stands still.
     """
     frames = np.arange(len(x))
     reaches = [max(round(share * len(x)), 1) for share in _REACHES]
@@ -244,7 +244,7 @@ def changes_of(x):
 
 
 def _change_units(on_clock, rounding):
-    """Mean absolute changes (n_reaches, n_features) of performances; infinite if rounding."""
+    """Mean absolute changes (n_reaches, n_features) of trials; infinite if rounding."""
     sizes = np.mean([np.abs(changes_of(x)).mean(axis=1) for x in on_clock], axis=0)
     return np.where(sizes > rounding, sizes, np.inf)
 
@@ -284,11 +284,11 @@ def _positive_median(distances):
 
 # Folds of the cross-validation in a fit.
 _N_FOLDS = 5
-# Eigenvalues below these shares of the largest are left out: of all performances what is rounding,
-# of landmarks what says little of other performances.
+# Eigenvalues below these shares of the largest are left out: of all trials what is rounding,
+# of landmarks what says little of other trials.
 _ALL_ROUNDING, _LEAST = 1e-10, 1e-5
 _MOST_ITERATIONS, _TOLERANCE = 10_000, 1e-6
-# Prior temperature, and the standard deviation of its logarithm, which counts as one performance:
+# Prior temperature, and the standard deviation of its logarithm, which counts as one trial:
 # on UTKinect it is 3.3 to 4.4.
 _PRIOR_TEMPERATURE, _PRIOR_STD = 4.0, 1.0
 
@@ -314,13 +314,13 @@ class KernelRegression:
         self._kernels = kernel.reshape(len(kernel), -1, len(self.landmarks)).swapaxes(0, 1)
 
     def fit(self, codes, chosen=None):
-        """Fit to the classes (n,), integers from 0, of some performances.
+        """Fit to the classes (n,), integers from 0, of some trials.
 
         Parameters
         ----------
         codes : ndarray of int, shape (n,)
         chosen : ndarray of bool, shape (n,), default=None
-            Which performances; the others are no landmarks, either. None: all.
+            Which trials; the others are no landmarks, either. None: all.
 
         Returns
         -------
@@ -368,9 +368,9 @@ def decision_values(kernel, A, b):
 
 
 def assign_folds(codes, groups, n_folds=_N_FOLDS):
-    """The fold of each performance, with no group in two folds.
+    """The fold of each trial, with no group in two folds.
 
-    Without groups the performances of each class are divided evenly, in order.
+    Without groups the trials of each class are divided evenly, in order.
     """
     folds = np.empty(len(codes), dtype=np.intp)
     if groups is None:
@@ -385,7 +385,7 @@ def assign_folds(codes, groups, n_folds=_N_FOLDS):
 
 
 def held_out_decisions(regression, kernel, codes, folds):
-    """Decision values (n, n_classes) of each performance, fitted on the other folds.
+    """Decision values (n, n_classes) of each trial, fitted on the other folds.
 
     NaN where these have fewer than two classes, or no landmark, and minus infinity for classes they
     do not have.
@@ -404,7 +404,7 @@ def fit_temperature(decisions, codes):
     Parameters
     ----------
     decisions : ndarray, shape (n, n_classes)
-        Of held-out performances, as `held_out_decisions` returns them.
+        Of held-out trials, as `held_out_decisions` returns them.
     codes : ndarray of int, shape (n,)
 
     Returns
@@ -424,9 +424,9 @@ def fit_temperature(decisions, codes):
 
 
 def fold_gain(regression, kernel, codes, folds, decisions):
-    """What the largest decision value of a performance gains from one more fold, in the median.
+    """What the largest decision value of a trial gains from one more fold, in the median.
 
-    Held-out values come from all folds but one, those of new performances from all ``G`` of them.
+    Held-out values come from all folds but one, those of new trials from all ``G`` of them.
     Fits without two neighbouring folds tell what the last but one brings. The error of a fit falls
     with the inverse of what it learns from, so the last fold brings ``(G - 2) / G`` of that.
 

@@ -130,7 +130,7 @@ function play(set) {
       label.textContent = timeText(own(i) * set.durations[i]);
     }
     time.value = Math.round(share * time.max);
-    const whole = isAligned() ? "At " + (100 * share).toFixed(0) + " % of the template"
+    const whole = isAligned() ? "At " + (100 * share).toFixed(0) + " % of the pattern"
       : (set.seconds ? "After " : "At ") + timeText(share * longest());
     const each = shown().map((i) => set.names[i] + " is at " + (100 * own(i)).toFixed(0) + " %");
     find("moment").textContent = whole + (each.length > 3 ? "" : ", trial " + each.join(", and trial ")) + ".";
@@ -209,7 +209,7 @@ function play(set) {
   function run(on) {
     if (on === (before !== null)) return;
     if (on && share >= 1) share = 0;
-    before = on ? performance.now() : null;
+    before = on ? trial.now() : null;
     button.textContent = on ? "Pause" : "Play";
     if (on) requestAnimationFrame(step);
   }

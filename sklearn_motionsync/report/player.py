@@ -12,7 +12,7 @@ from sklearn.pipeline import make_pipeline
 
 from ..body.base import PositionsTransformer
 from ..body.skeleton import Skeleton
-from ..display.arguments import as_names, as_performances, labels_as_text
+from ..display.arguments import as_names, as_trials, labels_as_text
 from ..display.base import COLORS
 from ..display.bodies import (
     bones_by_side,
@@ -23,7 +23,7 @@ from ..display.bodies import (
 )
 from ..inputs.numbers import as_numbers
 from ..inputs.resampling import as_frame_rates
-from ..inputs.types import NamesLike, NumbersLike, Path, PerformancesLike, Table, ValuesLike
+from ..inputs.types import NamesLike, NumbersLike, Path, Table, TrialsLike, ValuesLike
 from ..inputs.wording import counted
 from ..synchronizers.match import Match, match_of_times, rates_of
 from ..utils.pipelines import find_synchronizer, flat_steps, transform_through, union_transformers
@@ -46,7 +46,7 @@ _UNKNOWN = 4.0
 
 def write_player(
     path: Path,
-    X: PerformancesLike,
+    X: TrialsLike,
     skeleton: Skeleton | None,
     *,
     match: Match | BaseEstimator | None = None,
@@ -55,7 +55,7 @@ def write_player(
     frame_rate: float | ValuesLike | None = None,
     title: str | None = None,
 ) -> pathlib.Path:
-    """Write a player of performances side by side: one HTML file that opens without a network.
+    """Write a player of trials side by side: one HTML file that opens without a network.
 
     It plays, pauses, repeats and slows down, and moves frame by frame. Bodies are seen from any
     side. With ``match`` they move on one clock, or each at its own pace; without it only the
@@ -67,21 +67,21 @@ def write_player(
         Of the file, such as ``"squats.html"``. Its folder must exist. A file that is there already
         is replaced once the new one is complete.
     X : list of arrays (n_frames_i, n_dims * n_joints)
-        Joint positions of 1 to 24 performances, of two frames or more. NaN where a joint was not
+        Joint positions of 1 to 24 trials, of two frames or more. NaN where a joint was not
         seen.
     skeleton : Skeleton or None
         None shows the joints as points without bones, y up.
     match : Match, synchronizer or Pipeline with one, default=None
         The warps of X to one clock; of a fitted estimator those that it finds in X.
     names : list of str, default=None
-        The names under the performances; by default their labels in X, or numbers.
+        The names under the trials; by default their labels in X, or numbers.
     keyframes : array-like or DataFrame, shape (n_sequences, n_keyframes), default=None
-        Frames of each performance, NaN where one is not known. They are marked below the slider,
+        Frames of each trial, NaN where one is not known. They are marked below the slider,
         and a button for each leads there. Columns of a table are their names. On one clock a mark
-        is at the median of the performances.
+        is at the median of the trials.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second of X; by default what tables tell, as in `Match.offsets_in`. If it is not
-        known, the median performance takes four seconds.
+        known, the median trial takes four seconds.
     title : str, default=None
         Of the page; by default "Side by side".
 
@@ -95,7 +95,7 @@ def write_player(
     FileNotFoundError
         If there is no such folder.
     ValueError
-        If there are more than 24 performances, one has a single frame, or names, keyframes or
+        If there are more than 24 trials, one has a single frame, or names, keyframes or
         match do not have one entry for each; or if the path is that of a folder.
 
     See Also
@@ -106,7 +106,7 @@ def write_player(
     Notes
     -----
     Positions have a precision of a 30 000th of the largest, and take 4 MB of the file at most: of
-    more, longer performances have fewer frames. The page names it. The names are in the file.
+    more, longer trials have fewer frames. The page names it. The names are in the file.
 
     Examples
     --------
@@ -118,24 +118,22 @@ def write_player(
     '<!DOCTYPE html>'
     """
     path = check_path(path, "player")
-    performances = as_performances(X)
-    n = len(performances)
+    trials = as_trials(X)
+    n = len(trials)
     if n > MOST_SHOWN:
         raise ValueError(
-            f"X has {n} performances, and a player shows {MOST_SHOWN} side by side at most: choose "
+            f"X has {n} trials, and a player shows {MOST_SHOWN} side by side at most: choose "
             f"some of them, such as X[:{MOST_SHOWN}]."
         )
-    names = labels_as_text(performances) if names is None else names
-    names = as_names(names, n, "names", "performances")
-    bodies = [_points(x, skeleton, i) for i, x in enumerate(performances)]
+    names = labels_as_text(trials) if names is None else names
+    names = as_names(names, n, "names", "trials")
+    bodies = [_points(x, skeleton, i) for i, x in enumerate(trials)]
     for i, (points, _, _) in enumerate(bodies):
         if len(points) < 2:
-            raise ValueError(
-                f"Performance {i} has 1 frame; a player needs 2 or more: leave it out."
-            )
+            raise ValueError(f"Trial {i} has 1 frame; a player needs 2 or more: leave it out.")
         if points.shape[1:] != bodies[0][0].shape[1:]:
             raise ValueError(
-                f"Performance {i} has {points.shape[1:]} points and axes, and performance 0 "
+                f"Trial {i} has {points.shape[1:]} points and axes, and trial 0 "
                 f"{bodies[0][0].shape[1:]}; all must have the same."
             )
     lengths, rates = np.array([len(points) for points, _, _ in bodies]), rates_of(X, frame_rate)
@@ -144,7 +142,7 @@ def write_player(
         match = Match.from_estimator(match, X)
     if match is not None and len(match.times) != n:
         raise ValueError(
-            f"match must be of the {counted(n, 'performance')} of X, got one of "
+            f"match must be of the {counted(n, 'trial')} of X, got one of "
             f"{len(match.times)}: give Match.from_estimator(estimator, X)."
         )
     times = None if match is None else match.times
@@ -157,12 +155,12 @@ def write_player(
 
 
 def _marks(keyframes, lengths, times):
-    """Key-frames by name, as shares of each performance and of the clock; None if not known."""
+    """Key-frames by name, as shares of each trial and of the clock; None if not known."""
     names = [str(name) for name in getattr(keyframes, "columns", ())]
     frames = as_numbers(keyframes, "keyframes", dtype=np.float64)
     if frames.ndim != 2 or len(frames) != len(lengths):
         raise ValueError(
-            f"keyframes must have shape ({len(lengths)}, n_keyframes), one row a performance, with "
+            f"keyframes must have shape ({len(lengths)}, n_keyframes), one row a trial, with "
             f"NaN where one is not known; got {frames.shape}."
         )
     shares, out = frames / (lengths[:, np.newaxis] - 1), []
@@ -170,8 +168,8 @@ def _marks(keyframes, lengths, times):
     if len(outside):
         i, k = outside[0]
         raise ValueError(
-            f"Key-frame {k} of performance {i} is {frames[i, k]:g}, and its frames are from 0 to "
-            f"{lengths[i] - 1}: give frames of each performance."
+            f"Key-frame {k} of trial {i} is {frames[i, k]:g}, and its frames are from 0 to "
+            f"{lengths[i] - 1}: give frames of each trial."
         )
     for k, of_trials in enumerate(shares.T):
         clock = None
@@ -194,7 +192,7 @@ def _bodies_of(estimator, X, params):
     Parameters
     ----------
     estimator : synchronizer, or Pipeline with one
-    X : performances, as the estimator takes them
+    X : trials, as the estimator takes them
     params : dict
         As for `transform_through`.
     """
@@ -225,24 +223,24 @@ def player_of(trials, X, skeleton):
     Parameters
     ----------
     trials : TrialSet
-    X : performances
+    X : trials
         Joint positions.
     skeleton : Skeleton
     """
-    n, template = len(trials.names), trials.template
-    X = as_performances(X)
-    first = 0 if template is None else template
+    n, pattern = len(trials.names), trials.pattern
+    X = as_trials(X)
+    first = 0 if pattern is None else pattern
     width = int(np.prod(_points(X[first], skeleton, first)[0].shape[1:]))
     most = max(MOST_COORDINATES // (width * _FEWEST_FRAMES), 2)
     chosen = sorted(sorted(range(n), key=lambda i: i != first)[:most])
     right = chosen.index(first)
     data, note = data_of_bodies(
         [_points(X[i], skeleton, i) for i in chosen],
-        [trials.names[i] + " (template)" * (i == template) for i in chosen],
+        [trials.names[i] + " (pattern)" * (i == pattern) for i in chosen],
         None if trials.seconds is None else trials.seconds[chosen],
         trials.aligned.match.times[chosen],
     )
-    # One beside the template.
+    # One beside the pattern.
     data["shown"] = sorted({1 if right == 0 and len(chosen) > 1 else 0, right})
     if len(chosen) < n:
         note = f"{note} The player holds {counted(len(chosen), 'trial')} of {n}."

@@ -39,8 +39,8 @@ from ..inputs.types import (
     Features,
     Labels,
     Path,
-    PerformancesLike,
     RandomState,
+    TrialsLike,
     Unit,
     ValuesLike,
 )
@@ -66,13 +66,13 @@ _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 def write_report(
     path: Path,
     estimator: BaseEstimator,
-    X: PerformancesLike,
+    X: TrialsLike,
     *,
     groups: Labels | None = None,
     people: Labels | None = None,
     paired: bool = False,
     covariate: ValuesLike | None = None,
-    signals: PerformancesLike | None = None,
+    signals: TrialsLike | None = None,
     features: Features | None = None,
     skeleton: Skeleton | None = None,
     left_out: Mapping[Any, str] | None = None,
@@ -93,17 +93,17 @@ def write_report(
         Of the file, such as ``"report.html"``, which is replaced once the report is complete.
     estimator : synchronizer, or Pipeline with one
         Fitted, as for `compare_groups`.
-    X : performances
+    X : trials
         As the estimator takes them.
     groups : sequence of length n_sequences, default=None
-        The group of each performance: two or more. They are compared.
+        The group of each trial: two or more. They are compared.
     people : sequence of length n_sequences, default=None
-        The subject of each performance.
+        The subject of each trial.
     paired : bool, default=False
         Whether every person has trials in both of two groups.
     covariate : array-like of numbers, shape (n_sequences,), default=None
         Such as speed or age, instead of groups: a regression.
-    signals : performances, default=None
+    signals : trials, default=None
         What is shown and compared; by default as in `compare_groups`.
     features : int, str or list of them, default=None
         Those of the signals; by default all, and in figures of more than six the first four.
@@ -194,9 +194,9 @@ def _add_set(page, trials, estimator, left_out):
         text += f" of {n_people} {'person' if n_people == 1 else 'people'}"
     if "group" in trials.design:
         text += f" in {counted(len(trials.of_groups.labels), 'group')}"
-    template = "The template is none of these trials."
-    if trials.template is not None:
-        template = f"The template is trial {trials.names[trials.template]}."
+    pattern = "The pattern is none of these trials."
+    if trials.pattern is not None:
+        pattern = f"The pattern is trial {trials.names[trials.pattern]}."
     omitted = pd.DataFrame(
         [(text_of_label(label), str(reason)) for label, reason in (left_out or {}).items()],
         columns=["trial", "reason"],
@@ -205,7 +205,7 @@ def _add_set(page, trials, estimator, left_out):
         steps = [" ".join(repr(step).split()) for step in flat_steps(estimator)]
     page.add(
         "The set",
-        paragraph(f"{text}, on {len(trials.aligned.clock)} frames. {template}"),
+        paragraph(f"{text}, on {len(trials.aligned.clock)} frames. {pattern}"),
         table_of(trials.groups(), "Trials and their lengths"),
         table_of(omitted, f"Left out before: {counted(len(omitted), 'trial')}"),
         page.offer(left_out=omitted) if len(omitted) else "",
@@ -252,23 +252,23 @@ def _add_timing(page, trials):
     offset, unit = table.loc[where, largest], UNITS[trials.aligned.unit]
     finding = (
         f"The largest offset is that of trial {trials.names[where]}: {number(abs(offset))} {unit} "
-        f"{'later' if offset > 0 else 'earlier'} than the template, at "
+        f"{'later' if offset > 0 else 'earlier'} than the pattern, at "
         f"{number(table.loc[where, at])} {unit}."
     )
     if offset == 0:
-        finding = "No trial is later or earlier than the template."
-    columns = [name for name in table if name not in ("covariate", "template", "doubtful")]
+        finding = "No trial is later or earlier than the pattern."
+    columns = [name for name in table if name not in ("covariate", "pattern", "doubtful")]
     timing, _ = trials.by_frame()
     page.add(
         "Timing",
         paragraph(finding, "finding"),
         paragraph(
-            "An offset is how much later than the template a trial is, less where it is earlier. "
-            "All trials begin and end with the template: one that is slower throughout is not late."
+            "An offset is how much later than the pattern a trial is, less where it is earlier. "
+            "All trials begin and end with the pattern: one that is slower throughout is not late."
         ),
         picture(
             draw_offsets(trials),
-            f"Offsets of {counted(len(trials.names), 'trial')} along the template. {finding}",
+            f"Offsets of {counted(len(trials.names), 'trial')} along the pattern. {finding}",
         ),
         table_of(trials.timing(), "Offsets of groups") if "group" in trials.design else "",
         table_of(table[columns], "Offsets of trials"),
@@ -338,7 +338,7 @@ class TrialSet(NamedTuple):
     ----------
     aligned : AlignedCurves
     names : list of str
-    template : int or None
+    pattern : int or None
         Its index, if it is one of the trials.
     design : DataFrame
         What was given of each trial: ``group``, ``person``, ``covariate``.
@@ -353,7 +353,7 @@ class TrialSet(NamedTuple):
 
     aligned: AlignedCurves
     names: list
-    template: int | None
+    pattern: int | None
     design: pd.DataFrame
     of_groups: GroupsOfPeople
     frames: np.ndarray
@@ -372,13 +372,13 @@ class TrialSet(NamedTuple):
             design["person"] = names_of_groups(people, n, name="people")
         if covariate is not None:
             design["covariate"] = np.asarray(covariate, dtype=float)
-        frames = np.array([len(x) for x in reached.performances])
+        frames = np.array([len(x) for x in reached.trials])
         rates = rates_of(X, frame_rate)
         units = dict(zip(aligned.names, aligned.units, strict=True))
         return cls(
             aligned,
-            list(map(text_of_label, labels_of_input(X, reached.performances)[0])),
-            index_of_pattern(reached.synchronizer, reached.performances),
+            list(map(text_of_label, labels_of_input(X, reached.trials)[0])),
+            index_of_pattern(reached.synchronizer, reached.trials),
             pd.DataFrame(design, index=range(n)),
             of_groups,
             frames,
@@ -414,7 +414,7 @@ class TrialSet(NamedTuple):
         at = first_largest(np.abs(offsets), axis=1)
         table[mean] = np.abs(offsets).mean(axis=1)
         table[largest], table[place] = offsets[np.arange(len(offsets)), at], self.aligned.clock[at]
-        table["template"] = np.arange(len(table)) == self.template
+        table["pattern"] = np.arange(len(table)) == self.pattern
         if self.reasons is not None:
             table["doubtful"] = self.aligned.match.doubtful
         return table
@@ -469,9 +469,9 @@ class TrialSet(NamedTuple):
         n, unit = len(match.times), UNITS[self.aligned.unit]
         index = self.design.loc[np.repeat(range(n), len(frames))].reset_index(drop=True)
         index.insert(0, "trial", np.repeat(self.names, len(frames)))
-        index["frame of the template"] = np.tile(frames, n)
+        index["frame of the pattern"] = np.tile(frames, n)
         if self.aligned.unit != "frames":
-            index[f"time of the template ({unit})"] = np.tile(clock[frames], n)
+            index[f"time of the pattern ({unit})"] = np.tile(clock[frames], n)
         timing = index.copy()
         timing[f"offset ({unit})"] = self.aligned.offsets[:, frames].ravel()
         timing["frame of the trial"] = match.frames(self.frames)[:, frames].ravel()
@@ -510,19 +510,19 @@ def draw_signals(trials, shown):
     shown : list of int
         The signals.
     """
-    aligned, template = trials.aligned, trials.template
+    aligned, pattern = trials.aligned, trials.pattern
     n_frames, rate = len(aligned.clock), clock_rate(aligned.clock)
     lengths, keyframes = [n_frames] * len(aligned.even), _keyframes_of(aligned)
     after = aligned.curves[:, :, shown]
-    is_mean = template is None
+    is_mean = pattern is None
     display = SynchronizationDisplay(
         list(aligned.even[:, :, shown]),
         after,
         aligned.match,
         TimeAxis(aligned.unit, n_frames, lengths, rate, keyframes=keyframes),
         [trials.signals[i] for i in shown],
-        after.mean(axis=0) if is_mean else after[template],
-        ("time-normalised", "their mean" if is_mean else "the template"),
+        after.mean(axis=0) if is_mean else after[pattern],
+        ("time-normalised", "their mean" if is_mean else "the pattern"),
         list(map(str, trials.design["group"])) if "group" in trials.design else None,
     ).plot(warps=False)
     display.axes_[-2].set_xlabel(display.axes_[-1].get_xlabel())
@@ -548,7 +548,7 @@ def draw_offsets(trials):
     axis.axhline(0, color="0.4", linewidth=0.8, zorder=0)
     axis.set_xlim(clock[0], clock[-1])
     axis.set_xlabel(time.label)
-    axis.set_ylabel(f"later than\nthe template ({UNITS[aligned.unit]})")
+    axis.set_ylabel(f"later than\nthe pattern ({UNITS[aligned.unit]})")
     time.draw_keyframes([axis], axis)
     labels = [f"mean of {name}" for name in styles] if "group" in trials.design else ["their mean"]
     legend_above([axis], means, labels)

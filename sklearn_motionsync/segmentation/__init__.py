@@ -1,1 +1,1 @@
-"""Long recordings cut into performances: cycles, and where an action happens."""
+"""Long recordings cut into trials: cycles, and where an action happens."""

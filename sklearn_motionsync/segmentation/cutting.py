@@ -1,4 +1,4 @@
-"""Takes, and performances that are cut out of them."""
+"""Takes, and trials that are cut out of them."""
 
 import numpy as np
 import pandas as pd
@@ -32,34 +32,34 @@ def as_takes(X, *, univariate=False):
     return [take]
 
 
-def cut_takes(X, performances, rows):
-    """Cut performances out of takes.
+def cut_takes(X, trials, rows):
+    """Cut trials out of takes.
 
     Parameters
     ----------
     X : list of arrays (n_frames_i, n_features), or any collection
         The takes as they were given: DataFrames keep columns and ``attrs``, which are
-        moved to the frames of the performance.
-    performances : Performances
+        moved to the frames of the trial.
+    trials : Trials
         The same, checked.
     rows : DataFrame
-        One row a performance: ``take``, its index in ``X``; ``start`` and ``stop``, whole frames
+        One row a trial: ``take``, its index in ``X``; ``start`` and ``stop``, whole frames
         of the take, ``stop`` excluded; and other columns.
 
     Returns
     -------
-    performances : list of array, or of DataFrame, (n_frames_i, n_features)
+    trials : list of array, or of DataFrame, (n_frames_i, n_features)
         In the order of ``rows``. Those of DataFrames are indexed from 0, and labelled by the label
         of the take and their number in it, in order of time.
     locations : DataFrame
         ``rows``, with the labels of the takes in place of their indices.
     """
     collection = as_collection(X)
-    takes = list(performances if collection is None else collection)
+    takes = list(trials if collection is None else collection)
     numbers = rows.groupby("take")["start"].rank(method="first").astype(int).to_numpy() - 1
     tables = {i: takes[i] for i in set(rows["take"]) if isinstance(takes[i], pd.DataFrame)}
     recorded = {i: Recorded(table) for i, table in tables.items()}
-    performances_cut = []
+    trials_cut = []
     for take, start, stop, number in zip(
         rows["take"], rows["start"], rows["stop"], numbers, strict=True
     ):
@@ -69,11 +69,11 @@ def cut_takes(X, performances, rows):
             table = table.set_axis(pd.RangeIndex(len(table), name=FRAME))
             label, levels = own_label(source)
             levels = ("take",) if label is None else levels
-            name = label_of_part(performances.labels[take], int(number), "part", (*levels, FRAME))
+            name = label_of_part(trials.labels[take], int(number), "part", (*levels, FRAME))
             table.attrs = recorded[take].attrs_of(np.arange(start, stop)) | name
-            performances_cut.append(table)
+            trials_cut.append(table)
         else:
-            performances_cut.append(performances[take][start:stop].copy())
+            trials_cut.append(trials[take][start:stop].copy())
     labels = np.empty(len(rows), dtype=object)
-    labels[:] = [performances.labels[take] for take in rows["take"]]
-    return performances_cut, rows.assign(take=pd.Series(labels, index=rows.index).infer_objects())
+    labels[:] = [trials.labels[take] for take in rows["take"]]
+    return trials_cut, rows.assign(take=pd.Series(labels, index=rows.index).infer_objects())

@@ -22,8 +22,8 @@ from ..gait.recordings import FOOT_STRIKE, Recordings
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.types import PerformancesLike, ValuesLike
-from ..inputs.validation import check_performances, names_of_input, warn_of_clocks
+from ..inputs.types import TrialsLike, ValuesLike
+from ..inputs.validation import check_trials, names_of_input, warn_of_clocks
 from ..matching.counting import ROUNDING, first_largest, whole
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
@@ -55,7 +55,7 @@ __all__ = [
     "start_curves",
 ]
 
-# A fit matches the takes to the template, and estimates it again, so many times.
+# A fit matches the takes to the pattern, and estimates it again, so many times.
 _ROUNDS = 2
 # Cycles are as long as the learnt ones up to the first ratio, and the same up to the second.
 _AS_LONG, _SAME = 1.25, 1.001
@@ -80,23 +80,23 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     """Cut long takes of walking, running, or any movement that repeats, into its cycles.
 
     A take is one recording of several repetitions. A cycle is one repetition: it becomes one trial
-    (performance).
+    (trial).
 
     1. Stretches are the parts of a take in which it repeats. Standing, turning, starting and
        stopping are in none. `self_correlation` of a stretch gives its period. A take with a stretch
        is cyclic.
-    2. The template of one cycle is the mean of the cycles of all stretches at constant period.
-    3. Dense matching aligns every stretch with the template, repeated periodically: a path may
-       begin and end at any phase. The template is averaged again, twice.
-    4. The template begins where a foot is farthest ahead, in gait, or where a feature is largest.
+    2. The pattern of one cycle is the mean of the cycles of all stretches at constant period.
+    3. Dense matching aligns every stretch with the pattern, repeated periodically: a path may
+       begin and end at any phase. The pattern is averaged again, twice.
+    4. The pattern begins where a foot is farthest ahead, in gait, or where a feature is largest.
     5. Stretches are cut where their phase is a whole number.
 
     What is in no stretch is left out. So are the pieces of a stretch before the first cut and after
-    the last one, and cycles that do not follow the template; ``incomplete=True`` returns these. A
+    the last one, and cycles that do not follow the pattern; ``incomplete=True`` returns these. A
     piece can hold almost a whole repetition.
 
-    Takes that are segmented later are aligned with the template of ``fit``, so all are cut at the
-    same phase. A take gives several performances, hence `segment` and no ``transform``.
+    Takes that are segmented later are aligned with the pattern of ``fit``, so all are cut at the
+    same phase. A take gives several trials, hence `segment` and no ``transform``.
 
     Parameters
     ----------
@@ -120,10 +120,10 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         `self_correlation`) up to ``(1 + 2 threshold) / 3`` for a single feature; below two cycles
         it is divided by ``sqrt(n_cycles - 1)``; and if the take moves in other places, too.
     refine : bool, default=True
-        Whether stretches are matched to the template; False cuts at their constant mean period.
+        Whether stretches are matched to the pattern; False cuts at their constant mean period.
     incomplete : bool, default=False
         Whether to return the pieces of a stretch before its first and after its last whole cycle,
-        and cycles that do not follow the template, too. They are trials with ``complete`` False in
+        and cycles that do not follow the pattern, too. They are trials with ``complete`` False in
         the table of `segment`. False leaves them out.
     not_cyclic : {"raise", "skip"}, default="raise"
         What to do with a take without a stretch of at least 1.6 cycles.
@@ -137,8 +137,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
 
     Attributes
     ----------
-    template_ : ndarray, shape (32, 2 * n_compared)
-        The mean cycle from its start on: postures less the mean of their take, and velocities, each
+    pattern_ : ndarray, shape (32, 2 * n_compared)
+        The mean cycle from its start on: poses less the mean of their take, and velocities, each
         divided by its root mean square.
     start_ : str
         What begins a cycle: ``"left"``, ``"right"``, ``"left strike"``, ``"right strike"``, or the
@@ -160,7 +160,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     Gaps (NaN) are refused: fill them before, as by `io.fill_gaps`.
 
     A cycle lasts at least half the mean period of its stretch. The pace may change slowly, by a
-    fifth and more. Fit takes of different movements separately, as they have no common template;
+    fifth and more. Fit takes of different movements separately, as they have no common pattern;
     stretches that do not follow it are left out. Scale features of different units before, with
     ``FrameWise(StandardScaler())``.
 
@@ -211,7 +211,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         self.frame_rate = frame_rate
 
     @validated
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
+    def fit(self, X: TrialsLike, y: object = None) -> Self:
         """Learn one cycle, and where it begins.
 
         Parameters
@@ -247,11 +247,11 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             stretches = [(i, stretch) for i in cyclic for stretch in repeats[i].stretches]
             sampled = [sampled_stretch(features[i], stretch) for i, stretch in stretches]
             phases = self._learn_phases(sampled, progress)
-            template = average_cycle([t.values for t in sampled], phases)
+            pattern = average_cycle([t.values for t in sampled], phases)
             follow = [
                 k
                 for k, (t, p) in enumerate(zip(sampled, phases, strict=True))
-                if similarity(template, t, p) >= FOLLOWS
+                if similarity(pattern, t, p) >= FOLLOWS
             ]
             if 0 < len(follow) < len(stretches):
                 # The others show another movement.
@@ -267,15 +267,15 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                     self, [collection[i] for i in cyclic], [features[i] for i in cyclic]
                 )
                 name, start = self._find_start(curves, sampled, takes_of, phases)
-            template = average_cycle([t.values for t in sampled], [p - start for p in phases])
+            pattern = average_cycle([t.values for t in sampled], [p - start for p in phases])
             periods = np.full(len(takes), np.nan)
             for i in cyclic:
                 summary = summary_of([stretch for k, stretch in stretches if k == i])
                 periods[i] = summary.correlation.period
-        self.start_, self.template_, self.periods_ = name, template, periods
+        self.start_, self.pattern_, self.periods_ = name, pattern, periods
         return self
 
-    def segment(self, X: PerformancesLike) -> tuple[list[Any], pd.DataFrame]:
+    def segment(self, X: TrialsLike) -> tuple[list[Any], pd.DataFrame]:
         """Cut takes into cycles.
 
         Every cycle begins at the phase that `start` defines: about the frame where a foot is
@@ -289,17 +289,17 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
 
         Returns
         -------
-        performances : list of ndarray, or of DataFrame, (n_frames_i, n_features)
+        trials : list of ndarray, or of DataFrame, (n_frames_i, n_features)
             The cycles, one trial each, take by take, in order of time. The last frame of a cycle is
             the first of the next one, so both show the same phase. Cycles of DataFrames are
             labelled by the label of the take and their number, and `to_frame` makes one table of
             them.
         locations : DataFrame
-            One row a performance: ``take``, index or label of the take, to group by; ``stretch``,
+            One row a trial: ``take``, index or label of the take, to group by; ``stretch``,
             the number of the stretch in the take, from 0; ``start`` and ``stop``, frames of the
             take, ``stop`` excluded; ``complete``, whether it is a whole cycle that follows the
-            template; ``score``, its cosine similarity to the template, at most 1. A cycle follows
-            the template from a score of 0.5 on. The first and the last cycle of a stretch also move
+            pattern; ``score``, its cosine similarity to the pattern, at most 1. A cycle follows
+            the pattern from a score of 0.5 on. The first and the last cycle of a stretch also move
             at 0.85 of its speed where they begin and end, if the take goes on there.
 
         Raises
@@ -314,11 +314,11 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             may hold several repetitions, or a rest; a short one may be a part of a repetition. A
             take in which several cycles fit has the warning of ``fit`` instead.
         """
-        check_is_fitted(self, "template_")
+        check_is_fitted(self, "pattern_")
         collection, takes = check_takes(self, X, reset=False)
         rows, periods = [], []
         for i, number, stretch, sampled, phases in self._phases(collection, takes):
-            cycles = locate_cycles(sampled, phases, self.template_, self.incomplete)
+            cycles = locate_cycles(sampled, phases, self.pattern_, self.incomplete)
             cycles_of_stretch = [(i, number, *row) for row in cycles]
             rows += cycles_of_stretch
             # Where several cycles fit there was a warning of that.
@@ -330,7 +330,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         _warn_of_lengths(takes, table, np.array(periods))
         return cut_takes(collection, takes, table)
 
-    def phases(self, X: PerformancesLike) -> list[np.ndarray]:
+    def phases(self, X: TrialsLike) -> list[np.ndarray]:
         """The phase of every frame.
 
         Parameters
@@ -345,7 +345,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             first stretch; the next stretch goes on with the next number. NaN outside the stretches,
             and for takes that are skipped.
         """
-        check_is_fitted(self, "template_")
+        check_is_fitted(self, "pattern_")
         collection, takes = check_takes(self, X, reset=False)
         out = [np.full(len(take), np.nan) for take in takes]
         for i, _, stretch, sampled, phases in self._phases(collection, takes):
@@ -353,7 +353,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             out[i][inside] = np.interp(inside, sampled.times, phases)
         return out
 
-    def report(self, X: PerformancesLike) -> pd.DataFrame:
+    def report(self, X: TrialsLike) -> pd.DataFrame:
         """Whether takes are cyclic, and where, by their self-correlation; no fit is needed.
 
         Parameters
@@ -429,7 +429,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             first = 0
             for number, stretch in enumerate(repeats[i].stretches):
                 sampled = sampled_stretch(features[i], stretch)
-                phases = align(self.template_, sampled)
+                phases = align(self.pattern_, sampled)
                 if strikes is not None:
                     phases = move_to_events(sampled.times, phases, strikes[i])
                 phases = np.maximum(phases + first - whole(phases[0], "down"), first)
@@ -437,7 +437,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 yield i, number, stretch, sampled, phases
 
     def _learn_phases(self, sampled, progress):
-        """Phases of takes without a template: at constant pace one by one, then matched."""
+        """Phases of takes without a pattern: at constant pace one by one, then matched."""
         values, phases = [take.values for take in sampled], []
         for k, take in enumerate(sampled):
             phases.append(
@@ -446,14 +446,14 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         rounds = _ROUNDS if self.refine else 0
         step = progress.stage("matching takes", rounds * len(sampled))
         for _ in range(rounds):
-            template, phases = average_cycle(values, phases), []
+            pattern, phases = average_cycle(values, phases), []
             for take in sampled:
-                phases.append(match_phases(template, take))
+                phases.append(match_phases(pattern, take))
                 step()
         return phases
 
     def _find_start(self, curves, sampled, takes_of, phases):
-        """The name of what begins a cycle, and its phase in the template."""
+        """The name of what begins a cycle, and its phase in the pattern."""
         cycles = {
             name: average_cycle(
                 [
@@ -486,7 +486,7 @@ def check_takes(segmenter, X, *, reset):
     X = as_takes(X)
     # A period is that of its take, at any frame rate.
     facts = TIMELESS if segmenter.period is None else None
-    takes = check_performances(segmenter, X, reset=reset, level="sequence", facts=facts)
+    takes = check_trials(segmenter, X, reset=reset, level="sequence", facts=facts)
     if reset:
         warn_of_clocks(takes, names_of_input(segmenter))
     return as_collection(X), takes

@@ -1,4 +1,4 @@
-"""find_performances: where in long takes an action happens."""
+"""find_trials: where in long takes an action happens."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.resampling import as_frame_rates
 from ..inputs.tables import FRAME, as_pandas
-from ..inputs.types import Labels, PerformanceLike, PerformancesLike, ValuesLike
-from ..inputs.validation import SequenceLevelMixin, check_performances
+from ..inputs.types import Labels, TrialLike, TrialsLike, ValuesLike
+from ..inputs.validation import SequenceLevelMixin, check_trials
 from ..inputs.wording import counted, within
 from ..matching.counting import first_largest, whole
 from ..matching.matcher import Features
@@ -40,11 +40,11 @@ from ..utils.pipelines import (
 from .cutting import as_takes, cut_takes
 from .windows import WindowDissimilarity, example_indices
 
-__all__ = ["find_performances"]
+__all__ = ["find_trials"]
 
 # The clock of a pattern that is given as an array has at most so many frames.
 _CLOCK = 100
-# Hits may be shorter and longer than the training performances by this ratio; the larger one is for
+# Hits may be shorter and longer than the training trials by this ratio; the larger one is for
 # a single pattern.
 _MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
 # Rates that differ by a larger ratio are mistakes.
@@ -75,9 +75,9 @@ _NO_SCORE = 1e-300
         "verbose": ["verbose"],
     }
 )
-def find_performances(
-    pattern: BaseEstimator | PerformanceLike,
-    X: PerformancesLike,
+def find_trials(
+    pattern: BaseEstimator | TrialLike,
+    X: TrialsLike,
     *,
     threshold: float | Literal["auto"] | None = "auto",
     coverage: float = 0.8,
@@ -87,15 +87,15 @@ def find_performances(
     pattern_rate: float | None = None,
     verbose: int = 0,
 ) -> tuple[list[Any], pd.DataFrame]:
-    """Find an action in long takes, and cut its performances out of them.
+    """Find an action in long takes, and cut its trials out of them.
 
     1. The pattern is matched to overlapping portions of a take, at several time scales. Both ends
        of a path are free, so the match proposes a window: a start and a stop.
-    2. Each window is compared with the training performances after linear normalisation: by its
-       dissimilarity to the two nearest ones in posture and in the synchronizer's features, and by
+    2. Each window is compared with the training trials after linear normalisation: by its
+       dissimilarity to the two nearest ones in pose and in the synchronizer's features, and by
        its length and energy. The score is ``exp(-dissimilarity)``: 1 is equal, 0.37 as
        dissimilar as standing still. Windows have from 10 % fewer to 10 % more frames than the
-       training performances; those of a single pattern from 2/3 to 3/2 of its length.
+       training trials; those of a single pattern from 2/3 to 3/2 of its length.
     3. The ends of the best window are moved to where its score is best; then those of the best
        window that does not overlap it, and so on. Windows that reach the threshold are hits.
 
@@ -106,44 +106,44 @@ def find_performances(
     ----------
     pattern : fitted synchronizer, Pipeline, ActionDetector, or array (n_frames, n_features)
         The action to find. A pipeline ends in a synchronizer or in what follows one; its first step
-        takes the takes. An array is a single performance, which carries no information about the
-        differences between performances.
+        takes the takes. An array is a single trial, which carries no information about the
+        differences between trials.
     X : array (n_frames, n_features), list of such arrays, or other collection
         One take, or several. A take of a single feature may be one-dimensional. Takes of another
-        frame rate than the training performances are resampled to theirs. Tables know their rate,
+        frame rate than the training trials are resampled to theirs. Tables know their rate,
         by ``attrs["frame_rate"]`` or an index in seconds; for others give ``frame_rate`` and
         ``pattern_rate``. If neither is known, both are taken to have the same; where then nothing
         is found, a warning tells if there is something at half, twice, a quarter or four times the
         rate.
     threshold : "auto", float or None, default="auto"
-        The lowest score of a hit. ``"auto"``: learnt from the training performances, each compared
-        with those of other groups, but not below what random movements among their postures rarely
+        The lowest score of a hit. ``"auto"``: learnt from the training trials, each compared
+        with those of other groups, but not below what random movements among their poses rarely
         exceed; at least 0.50 and at most 0.90. In a take it is higher where many windows reach it.
         For an array 0.61, half as dissimilar as standing still. None: all windows that are better
         than those they overlap.
     coverage : float, default=0.8
-        Share of performances of new subjects, cut out by hand, that the learnt threshold accepts,
+        Share of trials of new subjects, cut out by hand, that the learnt threshold accepts,
         unless random movements score as high; less where many windows of a take do.
     max_hits : int, default=None
         How many hits are kept of each take, the best ones; by default all.
     groups : array-like, default=None
-        Group of each training performance, such as its subject. By default the groups that an
-        `ActionModel` in the pipeline was fitted with; it keeps those of at most 64 performances.
+        Group of each training trial, such as its subject. By default the groups that an
+        `ActionModel` in the pipeline was fitted with; it keeps those of at most 64 trials.
     frame_rate : float, or array-like of shape (n_takes,), default=None
         Frames a second of the takes. By default what tables tell.
     pattern_rate : float, default=None
-        Frames a second of the training performances, or of an array. By default what tables told
+        Frames a second of the training trials, or of an array. By default what tables told
         the synchronizer in ``fit``.
     verbose : int, default=0
         Above 0 prints the progress, take by take.
 
     Returns
     -------
-    performances : list of array, or of DataFrame, (n_frames_i, n_features)
+    trials : list of array, or of DataFrame, (n_frames_i, n_features)
         Cut out of the takes, take by take, in order of time. DataFrames keep columns, and are
         labelled by the label of their take and their number in it.
     locations : DataFrame
-        One row a performance: ``take``, its index or label; ``start`` and ``stop``, frames of the
+        One row a trial: ``take``, its index or label; ``start`` and ``stop``, frames of the
         take as it was given, ``stop`` excluded; ``score``; ``threshold``, the given one, or that of
         its take.
 
@@ -160,25 +160,25 @@ def find_performances(
 
     See Also
     --------
-    ActionDetector : Whether a performance that is cut out already is the action.
+    ActionDetector : Whether a trial that is cut out already is the action.
     sklearn_motionsync.display.SearchDisplay : Draws hits along the takes.
 
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import find_performances
+    >>> from sklearn_motionsync import find_trials
     >>> t = np.linspace(0, 1, 40)
     >>> wave = np.column_stack([np.sin(6 * t), np.sin(9 * t)])
     >>> take = np.zeros((300, 2))
     >>> take[50:90], take[200:250] = wave, np.column_stack(
     ...     [np.interp(np.linspace(0, 1, 50), t, x) for x in wave.T])
-    >>> performances, locations = find_performances(wave, take)
+    >>> trials, locations = find_trials(wave, take)
     >>> locations[["take", "start", "stop"]].to_numpy().tolist()
     [[0, 50, 90], [0, 200, 250]]
     """
     X = as_takes(X, univariate=True)
-    checker = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
-    checked = check_performances(checker, X, reset=True, level="sequence", facts=())
+    checker = type("find_trials", (SequenceLevelMixin, BaseEstimator), {})()
+    checked = check_trials(checker, X, reset=True, level="sequence", facts=())
     searched, paces, is_rate_known = _at_rate_of(pattern, X, checked, frame_rate, pattern_rate)
     synchronizer, takes, codes = _reach(pattern, searched, groups)
     _check_lengths(checked if searched is X else searched, takes, checked.called)
@@ -232,7 +232,7 @@ def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
 
     Parameters
     ----------
-    pattern, frame_rate, pattern_rate : as for `find_performances`
+    pattern, frame_rate, pattern_rate : as for `find_trials`
     X, checked : the takes, and the same, checked
 
     Returns
@@ -286,7 +286,7 @@ def _warn_of_other_rates(pattern, X, threshold, coverage, groups):
     """Warn if takes without hits would have some at another frame rate."""
     counts = {}
     for times in _OTHER_RATES:
-        _, locations = find_performances(
+        _, locations = find_trials(
             pattern,
             X,
             threshold=threshold,
@@ -437,10 +437,10 @@ def _reach(pattern, X, groups):
     """The synchronizer, the takes as they reach it, and the groups of its training set."""
     if not hasattr(pattern, "fit"):
         if groups is not None:
-            raise ValueError("groups are those of training performances; an array has none.")
+            raise ValueError("groups are those of training trials; an array has none.")
         pattern = _check_pattern(pattern)
         synchronizer = DenseSynchronizer(min(len(pattern), _CLOCK), pattern=0).fit([pattern])
-        return synchronizer, synchronizer.check_performances(X), None
+        return synchronizer, synchronizer.check_trials(X), None
     _, synchronizer = find_synchronizer(pattern)
     check_is_fitted(synchronizer)
     if synchronizer.examples_.shape[2] != synchronizer.n_features_in_:
@@ -448,24 +448,24 @@ def _reach(pattern, X, groups):
             f"{type(synchronizer).__name__} was fitted on the rows of a 2-D array, all of one "
             "length, but hits differ in length: fit it on [row[:, np.newaxis] for row in X]."
         )
-    reached = route_to_synchronizer(pattern, X, {}, "find_performances")
-    return reached.synchronizer, reached.performances, _training_groups(pattern, reached, groups)
+    reached = route_to_synchronizer(pattern, X, {}, "find_trials")
+    return reached.synchronizer, reached.trials, _training_groups(pattern, reached, groups)
 
 
 def _check_pattern(pattern):
-    """One performance: a DataFrame, or an array (n_frames, n_features)."""
+    """One trial: a DataFrame, or an array (n_frames, n_features)."""
     pattern = as_pandas(pattern)
     is_array = isinstance(pattern, (list, tuple, np.ndarray, pd.DataFrame))
     if is_array and as_collection(pattern) is not None:
         raise ValueError(
-            "The pattern is a collection of performances: give one of them, (n_frames, "
+            "The pattern is a collection of trials: give one of them, (n_frames, "
             "n_features), or fit a synchronizer to all, and give that."
         )
     array = as_numbers(pattern, "The pattern")
     array = array[:, np.newaxis] if array.ndim == 1 else array
     if array.ndim != 2 or len(array) < _SHORTEST:
         raise ValueError(
-            f"The pattern has shape {array.shape}: give one performance, (n_frames, "
+            f"The pattern has shape {array.shape}: give one trial, (n_frames, "
             f"n_features), of at least {_SHORTEST} frames, or a fitted synchronizer."
         )
     check_finite(array, "The pattern, frame")
@@ -473,7 +473,7 @@ def _check_pattern(pattern):
 
 
 def _training_groups(pattern, reached, groups):
-    """Codes of the groups of the training performances that the synchronizer keeps, or None."""
+    """Codes of the groups of the training trials that the synchronizer keeps, or None."""
     synchronizer = reached.synchronizer
     count = len(synchronizer.lengths_)
     if groups is not None:
@@ -485,15 +485,15 @@ def _training_groups(pattern, reached, groups):
     if not models or not hasattr(models[0], "groups_"):
         return None
     model_groups, n_seen = models[0].groups_, models[0].n_samples_seen_
-    # The model may have learnt from other performances since, by partial_fit.
+    # The model may have learnt from other trials since, by partial_fit.
     if len(model_groups) == n_seen == count:
         return model_groups
     if len(np.unique(model_groups)) < len(model_groups):
         warnings.warn(
             f"The model keeps the groups of {len(model_groups)} of "
-            f"{counted(n_seen, 'performance')}, the synchronizer was fitted on {count}: their "
+            f"{counted(n_seen, 'trial')}, the synchronizer was fitted on {count}: their "
             "groups are unknown, each counts as its own, and the threshold will be too high. Give "
-            "groups, one for each performance.",
+            "groups, one for each trial.",
             UserWarning,
             stacklevel=5,
         )
@@ -501,7 +501,7 @@ def _training_groups(pattern, reached, groups):
 
 
 def _limits_of_windows(lengths):
-    """The smallest and the largest number of frames of a window, by the training performances."""
+    """The smallest and the largest number of frames of a window, by the training trials."""
     margin = _MARGIN if len(lengths) > 1 else _MARGIN_OF_ONE
     shortest = max(_SHORTEST, whole(lengths.min() / margin, "down"))
     return shortest, whole(lengths.max() * margin, "up")

@@ -12,7 +12,7 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection, check_members
 from ..inputs.tables import as_pandas
-from ..inputs.types import PerformanceLike
+from ..inputs.types import TrialLike
 from ..inputs.wording import counted
 from ..matching.counting import parabola_vertex, whole
 from ..matching.filters import smooth
@@ -60,9 +60,9 @@ class SelfCorrelation(NamedTuple):
     ----------
     correlation : ndarray, shape (n_lags,)
         Correlation of the take with itself at lags of 0, 1, ... frames, up to 70 % of the take: the
-        mean of ``posture`` and ``velocity``, from -1 to 1.
-    posture, velocity : ndarray, shape (n_lags,)
-        Correlations of the postures, and of their velocities.
+        mean of ``pose`` and ``velocity``, from -1 to 1.
+    pose, velocity : ndarray, shape (n_lags,)
+        Correlations of the poses, and of their velocities.
     peaks : ndarray of int
         Lags of the maxima before which the correlation falls below half their height.
     period : float
@@ -83,7 +83,7 @@ class SelfCorrelation(NamedTuple):
     """
 
     correlation: np.ndarray
-    posture: np.ndarray
+    pose: np.ndarray
     velocity: np.ndarray
     peaks: np.ndarray
     period: float
@@ -93,7 +93,7 @@ class SelfCorrelation(NamedTuple):
     periods: np.ndarray
 
 
-def self_correlation(take: PerformanceLike, skeleton: Skeleton | None = None) -> SelfCorrelation:
+def self_correlation(take: TrialLike, skeleton: Skeleton | None = None) -> SelfCorrelation:
     r"""Correlate a take with itself at every lag, to find the period of what repeats.
 
     At lag :math:`L` it correlates the frames :math:`a(t) = x(t)` and :math:`b(t) = x(t + L)`, less
@@ -102,8 +102,8 @@ def self_correlation(take: PerformanceLike, skeleton: Skeleton | None = None) ->
     .. math:: r(L) = \frac{\sum_t \langle a(t), b(t) \rangle}
               {\sqrt{\sum_t |a(t)|^2 \; \sum_t |b(t)|^2}}
 
-    The result is the mean of the correlations of postures and of velocities. Velocities alone
-    mistake one stroke of several for a cycle; postures alone are sensitive to slow changes. At
+    The result is the mean of the correlations of poses and of velocities. Velocities alone
+    mistake one stroke of several for a cycle; poses alone are sensitive to slow changes. At
     every lag at least 30 % of the take overlap.
 
     Parameters
@@ -122,7 +122,7 @@ def self_correlation(take: PerformanceLike, skeleton: Skeleton | None = None) ->
     Raises
     ------
     ValueError
-        If the take breaks the contract of one performance.
+        If the take breaks the contract of one trial.
 
     See Also
     --------
@@ -130,7 +130,7 @@ def self_correlation(take: PerformanceLike, skeleton: Skeleton | None = None) ->
 
     Notes
     -----
-    Postures are smoothed by a Gaussian whose standard deviation is a fourth of the square root of
+    Poses are smoothed by a Gaussian whose standard deviation is a fourth of the square root of
     their variance divided by the variance of their change per frame: for a sine, a twenty-fifth of
     its period. Time and memory grow as those of a Fourier transform of the take.
 
@@ -155,7 +155,7 @@ def self_correlation(take: PerformanceLike, skeleton: Skeleton | None = None) ->
     several = as_collection(take)
     if several is not None and not (isinstance(take, pd.DataFrame) and len(several) == 1):
         raise ValueError(
-            f"Give one take, (n_frames, n_features), got {counted(len(several), 'performance')}; "
+            f"Give one take, (n_frames, n_features), got {counted(len(several), 'trial')}; "
             "for several use CycleSegmenter().report(X)."
         )
     (array,) = check_members([take])
@@ -174,12 +174,12 @@ def correlate(x, limits=None):
     x -= x.mean(axis=0)
     width, n_lags, noise = smoothing_width(x), int((1 - _OVERLAP) * n_frames) + 1, noise_of(x)
     smoothed = [smooth(x[np.newaxis], width, order)[0] for order in (0, 1)]
-    posture, velocity = (
+    pose, velocity = (
         _autocorrelation(y, n_lags, noise * noise_gain(width, order))
         for order, y in enumerate(smoothed)
     )
-    breadth, correlation = breadth_of(smoothed[0]), (posture + velocity) / 2
-    peaks = _find_peaks(correlation, posture)
+    breadth, correlation = breadth_of(smoothed[0]), (pose + velocity) / 2
+    peaks = _find_peaks(correlation, pose)
     offsets, values = parabola_vertex(*(correlation[peaks + k] for k in (-1, 0, 1)))
     lags = peaks + offsets
     if limits is not None:
@@ -197,7 +197,7 @@ def correlate(x, limits=None):
         fits[first] = True
         periods = _distinct_periods(lags[fits], values[fits], period)
     return SelfCorrelation(
-        correlation, posture, velocity, peaks, period, strength, n_cycles, breadth, periods
+        correlation, pose, velocity, peaks, period, strength, n_cycles, breadth, periods
     )
 
 
@@ -308,9 +308,9 @@ def _autocorrelation(x, n_lags, noise):
     return np.clip(out, -1, 1)
 
 
-def _find_peaks(correlation, posture):
-    """Maxima above 0 before which the correlation of postures falls below half their height."""
+def _find_peaks(correlation, pose):
+    """Maxima above 0 before which the correlation of poses falls below half their height."""
     inner, before, after = correlation[1:-1], correlation[:-2], correlation[2:]
     peaks = np.flatnonzero((inner > before) & (inner >= after) & (inner > 0)) + 1
-    lowest = np.minimum.accumulate(posture)
+    lowest = np.minimum.accumulate(pose)
     return peaks[lowest[peaks] < _FALL * correlation[peaks]]

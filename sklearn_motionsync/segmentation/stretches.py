@@ -291,7 +291,7 @@ class _Group:
 
 
 def signals_at(samples, lag, noise):
-    """Postures less their moving mean, and velocities, as they suit a lag; with their energies."""
+    """Poses less their moving mean, and velocities, as they suit a lag; with their energies."""
     width, signals = lag * _WIDTH, []
     for order in (0, 1):
         x = smooth(samples[np.newaxis], width, order)[0]
@@ -347,14 +347,14 @@ def _largest_sum(values, first, last):
 PHASES, _SUBFRAMES = 32, 4
 # Standard deviation, in samples, of the Gaussian derivative that gives velocities.
 _SPEED_WIDTH = 1
-# Weight of (rho - 1)^2, for postures and velocities of mean square 1 each; the largest rate rho.
+# Weight of (rho - 1)^2, for poses and velocities of mean square 1 each; the largest rate rho.
 _SMOOTHNESS, _FASTEST = 0.3, 2
 # Largest offset of a path from the mean pace, in cycles: at its beginning, and more per cycle.
 _BEGIN, _DRIFT = 0.55, 0.3
-# The first and the last cycle of a stretch within a take move as fast as this share of the template
+# The first and the last cycle of a stretch within a take move as fast as this share of the pattern
 # in this outer part, or the movement only begins there, or stops.
 _PACE, _OUTER = 0.85, 0.1
-# Cycles follow the template from this similarity on.
+# Cycles follow the pattern from this similarity on.
 FOLLOWS = 0.5
 # A known beginning of a cycle is at most so far from that of the match, in cycles.
 _NEAR = 0.2
@@ -379,7 +379,7 @@ class SampledStretch:
     times : ndarray, shape (n_samples,)
         Frames of the samples, from the first to the last.
     values : ndarray, shape (n_samples, 2 * n_features)
-        Postures less their mean, and velocities; each of mean square 1.
+        Poses less their mean, and velocities; each of mean square 1.
     mean_phases : ndarray, shape (n_samples,)
         Phases at the mean pace, 0 at the first frame.
     """
@@ -393,9 +393,9 @@ class SampledStretch:
         n_samples = max(whole(last / period * PHASES), 1) + 1
         self.times = np.linspace(start, start + last, n_samples)
         self.mean_phases = (self.times - start) / period
-        postures = self._sample(smooth(inside[np.newaxis], period / PHASES / 2)[0])
-        velocities = smooth(postures[np.newaxis], _SPEED_WIDTH, 1)[0]
-        self.values = np.concatenate([_standardise(postures), _standardise(velocities)], axis=1)
+        poses = self._sample(smooth(inside[np.newaxis], period / PHASES / 2)[0])
+        velocities = smooth(poses[np.newaxis], _SPEED_WIDTH, 1)[0]
+        self.values = np.concatenate([_standardise(poses), _standardise(velocities)], axis=1)
 
     def sample(self, values):
         """Values of the frames of the take, (n_frames, n), at the samples."""
@@ -431,21 +431,21 @@ def average_cycle(many_values, many_phases):
     return sums / np.maximum(counts, 1)[:, np.newaxis]
 
 
-def constant_phases(template, take):
-    """Phases at the mean pace, shifted to the best circular correlation with the template."""
+def constant_phases(pattern, take):
+    """Phases at the mean pace, shifted to the best circular correlation with the pattern."""
     cycle = average_cycle([take.values], [take.mean_phases])
-    products = rfft(template, axis=0) * rfft(cycle, axis=0).conj()
+    products = rfft(pattern, axis=0) * rfft(cycle, axis=0).conj()
     correlation = irfft(products.sum(axis=1), PHASES)
     return take.mean_phases + first_largest(correlation) / PHASES
 
 
-def match_phases(template, take):
-    """Phases of the best path of a take along the repeated template (Eqs. 12-17).
+def match_phases(pattern, take):
+    """Phases of the best path of a take along the repeated pattern (Eqs. 12-17).
 
     Takes of many cycles are matched in overlapping portions, so that time and memory grow linearly.
     The phases of a portion end in the middle of the overlap with the next one.
     """
-    values, cycle = take.values, _upsample(template)
+    values, cycle = take.values, _upsample(pattern)
     size, overlap = _PORTION * PHASES, _OVERLAP * PHASES
     phases = _match_portion(cycle, values[: size + overlap])
     for start in range(size, len(values) - overlap, size):
@@ -457,7 +457,7 @@ def match_phases(template, take):
 
 
 def _match_portion(cycle, values):
-    steps, moving, inner, _, _ = step_table("posture", _FASTEST, _SUBFRAMES)
+    steps, moving, inner, _, _ = step_table("pose", _FASTEST, _SUBFRAMES)
     table = StepTable(steps, moving, inner, np.square(steps / _SUBFRAMES - 1), _SUBFRAMES)
     reach = int(np.ceil(PHASES * _BEGIN + _DRIFT * len(values)))
     trellis = Trellis(table, _SMOOTHNESS, reach, free=True)
@@ -468,12 +468,12 @@ def _match_portion(cycle, values):
     return (np.arange(0, last + 1, _SUBFRAMES) + path) / len(cycle)
 
 
-def _upsample(template):
-    """The closed template at `_SUBFRAMES` positions per sample, by linear interpolation."""
+def _upsample(pattern):
+    """The closed pattern at `_SUBFRAMES` positions per sample, by linear interpolation."""
     share = (np.arange(_SUBFRAMES) / _SUBFRAMES)[:, np.newaxis]
-    following = np.roll(template, -1, axis=0)[:, np.newaxis]
-    fine = (1 - share) * template[:, np.newaxis] + share * following
-    return fine.reshape(-1, template.shape[1])
+    following = np.roll(pattern, -1, axis=0)[:, np.newaxis]
+    fine = (1 - share) * pattern[:, np.newaxis] + share * following
+    return fine.reshape(-1, pattern.shape[1])
 
 
 def circular_peak(curve):
@@ -504,10 +504,10 @@ def move_to_events(times, phases, events):
     return np.maximum.accumulate(phases + np.interp(phases, at[near], (nearest - at)[near]))
 
 
-def locate_cycles(take, phases, template, incomplete):
-    """Yield start, stop, completeness, and similarity to the template, of cycles of a stretch.
+def locate_cycles(take, phases, pattern, incomplete):
+    """Yield start, stop, completeness, and similarity to the pattern, of cycles of a stretch.
 
-    A cycle is complete if it is whole, and similar to the template; others are left out, or
+    A cycle is complete if it is whole, and similar to the pattern; others are left out, or
     ``incomplete``.
     """
     begins = np.arange(whole(phases[0], "up"), whole(phases[-1], "down") + 1)
@@ -518,37 +518,37 @@ def locate_cycles(take, phases, template, incomplete):
     for within, inner, k, share in outer:
         if within and len(begins):
             first, last = sorted([begins[k], begins[k] + share])
-            if not _keeps_pace(template, take, phases, first, last):
+            if not _keeps_pace(pattern, take, phases, first, last):
                 begins, frames = begins[inner], frames[inner]
     ends = list(zip(begins, frames.tolist(), strict=True))
     if incomplete:
         ends = [(phases[0], int(take.times[0])), *ends, (phases[-1], int(take.times[-1]))]
     for (first, start), (following, stop) in pairwise(ends):
         if stop > start:
-            score = similarity(template, take, phases, first, following)
+            score = similarity(pattern, take, phases, first, following)
             complete = {first, following} <= set(begins) and score >= FOLLOWS
             if complete or incomplete:
                 yield start, stop + 1, complete, score
 
 
-def _keeps_pace(template, take, phases, first, last):
-    """Whether a stretch moves about as fast as the template, from one phase to another."""
-    values, expected = _between(template, take, phases, first, last)
-    width = template.shape[1] // 2
+def _keeps_pace(pattern, take, phases, first, last):
+    """Whether a stretch moves about as fast as the pattern, from one phase to another."""
+    values, expected = _between(pattern, take, phases, first, last)
+    width = pattern.shape[1] // 2
     speeds = [np.square(x[:, width:]).sum() for x in (values, expected)]
     return speeds[0] >= _PACE**2 * speeds[1]
 
 
-def _between(template, take, phases, first, last):
-    """Samples of a stretch from one phase to another, and the same of the template."""
+def _between(pattern, take, phases, first, last):
+    """Samples of a stretch from one phase to another, and the same of the pattern."""
     inside = (phases >= first) & (phases < last)
-    cycle = _upsample(template)
+    cycle = _upsample(pattern)
     places = whole(phases[inside] * len(cycle))
     return take.values[inside], cycle[places % len(cycle)]
 
 
-def similarity(template, take, phases, first=-np.inf, last=np.inf):
-    """Cosine similarity of a stretch to the template, from one phase to another."""
-    values, expected = (x.ravel() for x in _between(template, take, phases, first, last))
+def similarity(pattern, take, phases, first=-np.inf, last=np.inf):
+    """Cosine similarity of a stretch to the pattern, from one phase to another."""
+    values, expected = (x.ravel() for x in _between(pattern, take, phases, first, last))
     size = np.sqrt((values @ values) * (expected @ expected))
     return float(values @ expected / size) if size > 0 else 0.0

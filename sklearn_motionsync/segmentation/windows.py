@@ -1,4 +1,4 @@
-"""Dissimilarity of windows of a take to training performances, and its threshold."""
+"""Dissimilarity of windows of a take to training trials, and its threshold."""
 
 import numpy as np
 from scipy.signal import lfilter
@@ -20,19 +20,19 @@ _MAX_LOG_FACTOR = 3.0
 # Standing still has the dissimilarity 1. The upper limit keeps the threshold below it, however much
 # people differ; the lower one allows for noise in takes and windows that begin at whole frames.
 _MAX_THRESHOLD, _MIN_THRESHOLD = 0.7, 0.1
-# The threshold of a single performance, of which no variation can be learnt.
+# The threshold of a single trial, of which no variation can be learnt.
 _DEFAULT_THRESHOLD = 0.5
 # Random movements, and the share of them that may lie below the threshold.
 _N_RANDOM, _RANDOM_QUANTILE = 1000, 0.005
 # The threshold of a take is the best of so many, down to this factor of the limit. Each hit costs
-# this share of the performances that are found, and each window about the threshold, in a Gaussian
+# this share of the trials that are found, and each window about the threshold, in a Gaussian
 # of this width of logarithms.
 _N_THRESHOLDS, _LOWEST = 200, np.exp(-1.5)
 _COST_OF_HIT, _COST_ABOUT, _ABOUT = 0.02, 0.1, 0.05
 # Takes of more typical lengths than these have costs in proportion: one in which the action is
 # repeated without end keeps the limit, as its hits cost at most 0.02 * 45 of what they gain.
 _LONG_TAKE = 45
-# Hits are so many times less dissimilar than performances cut out by hand, as their ends are moved
+# Hits are so many times less dissimilar than trials cut out by hand, as their ends are moved
 # to where they are least (1.3 to 1.7 for half of 55 actions of people, by medians).
 _BY_ENDS = 1.5
 # Windows that are compared at a time, which bounds the memory.
@@ -43,18 +43,18 @@ _MAX_POSITIONS = 100
 
 def example_indices(synchronizer):
     """Indices in the training set of the examples that the synchronizer keeps, evenly spaced."""
-    n_performances, n_examples = len(synchronizer.lengths_), len(synchronizer.examples_)
-    return np.linspace(0, n_performances - 1, n_examples).round().astype(np.intp)
+    n_trials, n_examples = len(synchronizer.lengths_), len(synchronizer.examples_)
+    return np.linspace(0, n_trials - 1, n_examples).round().astype(np.intp)
 
 
 class WindowDissimilarity:
-    """Dissimilarity of windows to training performances: 0 equal, 1 as that of standing still.
+    """Dissimilarity of windows to training trials: 0 equal, 1 as that of standing still.
 
-    The mean over the two most similar training performances of::
+    The mean over the two most similar training trials of::
 
         r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2),
 
-    half of postures less their own mean over time, to which a tenth of the squared distance of
+    half of poses less their own mean over time, to which a tenth of the squared distance of
     these means is added, half of the features of the synchronizer; times e to a twentieth of the
     squared standard scores of the logarithms of length and energy.
 
@@ -62,12 +62,12 @@ class WindowDissimilarity:
     ----------
     synchronizer : fitted Synchronizer
     groups : array-like (n_examples,), default=None
-        Of the training performances that it keeps; by default each is its own.
+        Of the training trials that it keeps; by default each is its own.
 
     Attributes
     ----------
     known : ndarray (n_examples,)
-        That of the training performances, each compared with those of other groups.
+        That of the training trials, each compared with those of other groups.
     """
 
     def __init__(self, synchronizer, groups=None):
@@ -81,7 +81,7 @@ class WindowDissimilarity:
         if energy.max() <= self._floor:
             raise ValueError(
                 "The pattern does not move: it fits every moment of a take in which nothing moves. "
-                "Give a pattern that moves, or fit on performances that do."
+                "Give a pattern that moves, or fit on trials that do."
             )
         self._energy = LogMoments.of(energy).standardize
         codes, _ = encode_groups(groups, count, at_least=min(count, 2))
@@ -91,7 +91,7 @@ class WindowDissimilarity:
             self.known = self._measure(positions, lengths[example_indices(synchronizer)], codes)
 
     def threshold(self, coverage):
-        """The dissimilarity below which a share of the performances of new people lies.
+        """The dissimilarity below which a share of the trials of new people lies.
 
         It is at most that of random movements.
         """
@@ -103,11 +103,11 @@ class WindowDissimilarity:
     def threshold_of_take(self, limit, hits, n_frames):
         """The threshold of a take: the limit, or a lower one where many windows are below it.
 
-        It maximises the share of performances that are found, less costs of windows::
+        It maximises the share of trials that are found, less costs of windows::
 
             Phi(z(1.5 T)) - (0.02 #{u < T} + 0.1 sum exp(-log(u / T)^2 / (2 * 0.05^2))) / n
 
-        with standard scores z of logarithms among training performances. So it rejects what many
+        with standard scores z of logarithms among training trials. So it rejects what many
         windows are as similar as, and lies in a gap where there is one. n is 1, and grows with
         takes beyond 45 typical lengths.
 
@@ -160,9 +160,9 @@ class WindowDissimilarity:
         ]
         return float(np.quantile(np.concatenate(dissimilarities), _RANDOM_QUANTILE))
 
-    def _positions(self, performances):
-        """Performances at all positions, in the unit of the features, in double precision."""
-        arrays = [np.asarray(x, dtype=np.float64) for x in performances]
+    def _positions(self, trials):
+        """Trials at all positions, in the unit of the features, in double precision."""
+        arrays = [np.asarray(x, dtype=np.float64) for x in trials]
         return self._features.unit(normalise(arrays, self._n_positions))
 
     def _measure(self, positions, lengths, groups=None):
@@ -176,12 +176,12 @@ class WindowDissimilarity:
 
 
 def random_movements(positions, counts):
-    """Movements with the mean and the covariance of postures, smooth as those of people.
+    """Movements with the mean and the covariance of poses, smooth as those of people.
 
     Parameters
     ----------
     positions : ndarray, shape (n_sequences, Q, n_features)
-        Performances on the clock.
+        Trials on the clock.
     counts : iterable of int
         How many at a time; always the same ones for the same ``counts``.
 
@@ -190,10 +190,10 @@ def random_movements(positions, counts):
     ndarray, shape (count, Q, n_features)
     """
     _, n_positions, n_features = positions.shape
-    postures = positions.reshape(-1, n_features)
-    center = postures.mean(axis=0)
-    _, spread, axes = np.linalg.svd(postures - center, full_matrices=False)
-    axes *= spread[:, np.newaxis] / np.sqrt(len(postures))
+    poses = positions.reshape(-1, n_features)
+    center = poses.mean(axis=0)
+    _, spread, axes = np.linalg.svd(poses - center, full_matrices=False)
+    axes *= spread[:, np.newaxis] / np.sqrt(len(poses))
     memory, rng = np.exp(-1 / n_positions), np.random.default_rng(0)
     for count in counts:
         steps = rng.standard_normal((count, n_positions, len(axes)))

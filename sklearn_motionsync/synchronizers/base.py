@@ -18,7 +18,7 @@ from sklearn.base import (
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.collections import Performances, as_source
+from ..inputs.collections import Trials, as_source
 from ..inputs.features import check_input_features
 from ..inputs.keyframes import Keyframes
 from ..inputs.recorded import refuse_moved_events
@@ -27,15 +27,15 @@ from ..inputs.types import (
     Indexed,
     NamesLike,
     NumbersLike,
-    PerformanceLike,
-    PerformancesLike,
     SupportsArray,
     Transformed,
+    TrialLike,
+    TrialsLike,
     ValuesLike,
 )
 from ..inputs.validation import (
-    PerformanceTransformerMixin,
     SequenceLevelMixin,
+    TrialTransformerMixin,
     labels_of_parts,
     names_of_input,
     read_source,
@@ -55,7 +55,7 @@ from .training import (
     TrainingSet,
     check_fill,
     check_pattern,
-    fill_performances,
+    fill_trials,
     fill_warped,
     hold_gaps,
     learn_filler,
@@ -68,23 +68,23 @@ __all__ = ["AnchoredSynchronizer", "Synchronizer"]
 
 
 class Synchronizer(
-    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, PerformanceTransformerMixin, BaseEstimator
+    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, BaseEstimator
 ):
     """Base class of all synchronizers: a subclass defines ``match``.
 
     It inherits ``fit``, which chooses the pattern after linear normalisation,
     ``transform``, pandas output, and what scorers and displays need. These call ``match`` with
     a sequence of checked arrays, users with any collection; ``normalize`` and
-    ``check_performances`` take both. A subclass with further parameters defines ``__init__``, as
+    ``check_trials`` take both. A subclass with further parameters defines ``__init__``, as
     in scikit-learn, with ``n_frames`` and ``pattern`` among them.
 
     Parameters
     ----------
     n_frames : int, default=None
-        Frames of the common clock; by default the median length of the performances, or
+        Frames of the common clock; by default the median length of the trials, or
         the length of a pattern given as an array.
     pattern : "median", int or array (n_frames, n_features), default="median"
-        The performance with the smallest sum of squared distances to all others after linear
+        The trial with the smallest sum of squared distances to all others after linear
         normalisation, one chosen by its index, or another one.
 
     Attributes
@@ -96,14 +96,14 @@ class Synchronizer(
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        Sum of the squared distances of each performance to all others; NaN if the pattern was
+        Sum of the squared distances of each trial to all others; NaN if the pattern was
         given.
     lengths_ : ndarray of int, shape (n_sequences,)
-        Numbers of frames of the training performances.
+        Numbers of frames of the training trials.
     examples_ : ndarray, shape (min(n_sequences, 64), P, n_features)
-        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+        Training trials linearly normalised: all, or 64 of them, evenly spaced.
     features_ : callable
-        Turns postures on the clock into the features that are compared.
+        Turns poses on the clock into the features that are compared.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -148,24 +148,24 @@ class Synchronizer(
     examples_: np.ndarray
 
     # Advice of the error if the training set does not fit into memory.
-    _SMALLER = "fewer frames or performances"
+    _SMALLER = "fewer frames or trials"
 
     def __init__(
         self,
         n_frames: int | None = None,
-        pattern: PerformanceLike | int | Literal["median"] = "median",
+        pattern: TrialLike | int | Literal["median"] = "median",
     ) -> None:
         self.n_frames = n_frames
         self.pattern = pattern
 
     @validated
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
-        """Choose the pattern, the performance to whose clock all others are warped.
+    def fit(self, X: TrialsLike, y: object = None) -> Self:
+        """Choose the pattern, the trial to whose clock all others are warped.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : ignored
             Present for API consistency.
 
@@ -184,26 +184,24 @@ class Synchronizer(
         self.__dict__.update(learnt)
         return self
 
-    def transform(
-        self, X: PerformancesLike, *, fill: Literal["model"] | None = None
-    ) -> Transformed:
-        """Warp performances onto the clock of the pattern (Eq. 18).
+    def transform(self, X: TrialsLike, *, fill: Literal["model"] | None = None) -> Transformed:
+        """Warp trials onto the clock of the pattern (Eq. 18).
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances. Memory maps, and collections that give performances by index, are read in
+            Trials. Memory maps, and collections that give trials by index, are read in
             parts, once each; rows of a matrix are loaded into memory.
         fill : {None, "model"}, default=None
             What becomes of NaN, which is what was hidden. None: it stays NaN, feature by feature.
             "model": it is filled from the mean of the warped training set (``examples_``) at the
-            same moment, moved by how far the performance is from the mean around the gap, and in
+            same moment, moved by how far the trial is from the mean around the gap, and in
             the features that are seen.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
-            ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
+            ``(n_sequences, P)`` for 2-D input; a ``(trial, frame)`` frame under
             ``set_output(transform="pandas")``.
 
         Raises
@@ -213,19 +211,19 @@ class Synchronizer(
         """
         return self._warp(X, fill)
 
-    def match(self, X: PerformancesLike) -> Match:
-        """Match performances to the pattern.
+    def match(self, X: TrialsLike) -> Match:
+        """Match trials to the pattern.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         Match
             ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
-            the pattern, both of performances linearly normalised to its length (Eq. 7), and
+            the pattern, both of trials linearly normalised to its length (Eq. 7), and
             ``distances``, shape (n_sequences,). tau is non-decreasing, ``tau(0) = 0``,
             ``tau(P-1) = P-1``.
         """
@@ -233,20 +231,20 @@ class Synchronizer(
             f"{type(self).__name__} does not define match(self, X), which returns a Match."
         )
 
-    def normalize(self, X: PerformancesLike) -> np.ndarray:
-        """Normalise performances linearly to the clock of the pattern, without matching (Eq. 7).
+    def normalize(self, X: TrialsLike) -> np.ndarray:
+        """Normalise trials linearly to the clock of the pattern, without matching (Eq. 7).
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
             One feature for the rows of a 2-D array.
         """
-        return normalise(self.check_performances(X), self.n_frames_)
+        return normalise(self.check_trials(X), self.n_frames_)
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the outputs: the features of a frame; for 2-D input, one name a frame.
@@ -293,32 +291,32 @@ class Synchronizer(
     def _warp(self, X, fill=None, **params):
         if fill is not None:
             check_fill(fill)
-        # Further parameters are given for all performances at once.
+        # Further parameters are given for all trials at once.
         source = None if params else self._read_in_parts(X)
         if source is None:
-            performances = self.check_performances(X)
-            out = self._warp_part(performances, **params)
+            trials = self.check_trials(X)
+            out = self._warp_part(trials, **params)
         else:
             n_trials, portions = source
-            performances, out = self._warp_parts(n_trials, portions)
+            trials, out = self._warp_parts(n_trials, portions)
         if fill == "model" and is_gappy(out):
-            examples = Performances(list(self.examples_), "list", list(range(len(self.examples_))))
+            examples = Trials(list(self.examples_), "list", list(range(len(self.examples_))))
             fill_warped(out, self._warp_part(examples))
-        if performances.kind == "rows":
+        if trials.kind == "rows":
             return out[:, :, 0]
-        return restore(self, performances, out, frames=range(out.shape[1]))
+        return restore(self, trials, out, frames=range(out.shape[1]))
 
-    def _warp_part(self, performances, **params):
-        return self._match(performances, **params).warp(performances)
+    def _warp_part(self, trials, **params):
+        return self._match(trials, **params).warp(trials)
 
-    def _match(self, performances, **params):
-        """The match of checked performances."""
-        match = self.match(performances, **params)
-        check_match(match, len(performances), self.n_frames_, type(self).__name__)
+    def _match(self, trials, **params):
+        """The match of checked trials."""
+        match = self.match(trials, **params)
+        check_match(match, len(trials), self.n_frames_, type(self).__name__)
         return match
 
     def _warp_parts(self, n_sequences, portions):
-        """Labels of performances that are read in portions, and these warped."""
+        """Labels of trials that are read in portions, and these warped."""
         out, labels, levels = None, [], set()
         for trials in portions:
             warped, start = self._warp_part(trials), len(labels)
@@ -330,17 +328,17 @@ class Synchronizer(
         return labels_of_parts(labels, levels, trials.names), out
 
     def _read_in_parts(self, X):
-        """The number of performances, and checked portions of them; None if all are in memory."""
-        source = None if isinstance(X, Performances) else as_source(X)
+        """The number of trials, and checked portions of them; None if all are in memory."""
+        source = None if isinstance(X, Trials) else as_source(X)
         if source is None or len(source) == 0:
             return None
         return len(source), read_source(self, source, self._read_rows_in_fit())
 
     def _match_in_parts(self, X):
-        """The match of performances, which may be read in parts."""
+        """The match of trials, which may be read in parts."""
         source = self._read_in_parts(X)
         if source is None:
-            return self._match(self.check_performances(X))
+            return self._match(self.check_trials(X))
         matches, tells = [], False
         for trials in source[1]:
             match = self._match(trials)
@@ -355,17 +353,17 @@ class Synchronizer(
         return Match(times, distances, intervals)
 
     def _measured_in_parts(self, X):
-        """What the intervals of performances need, which are read and matched once more."""
+        """What the intervals of trials need, which are read and matched once more."""
         return joined(
             self._match(trials).intervals.measured() for trials in self._read_in_parts(X)[1]
         )
 
-    def _without_gaps(self, performances):
-        """Checked performances, filled where they are NaN."""
-        if not hold_gaps(performances):
-            return performances
+    def _without_gaps(self, trials):
+        """Checked trials, filled where they are NaN."""
+        if not hold_gaps(trials):
+            return trials
         filler = self._filler or learn_filler(self.examples_)
-        return fill_performances(filler, performances)
+        return fill_trials(filler, trials)
 
     # -- steps of a fit ---------------------------------------------------------------------
 
@@ -378,7 +376,7 @@ class Synchronizer(
         filler = None
         if hold_gaps(trials):
             filler = learn_filler(trials, names_of_input(self))
-            trials = fill_performances(filler, trials)
+            trials = fill_trials(filler, trials)
         return TrainingSet(trials, filler, population or len(trials))
 
     def _put_on_clock(self, training, pattern, keyframe_std=0.0):
@@ -412,7 +410,7 @@ class AnchoredSynchronizer(Synchronizer):
     """Base class of synchronizers whose methods take key-frames.
 
     A subclass defines ``_learn(training, progress)``, as `Synchronizer`, with the key-frames of the
-    training set; and ``_match(performances, keyframes, frame_rate)``, which calls ``_shares`` for
+    training set; and ``_match(trials, keyframes, frame_rate)``, which calls ``_shares`` for
     the same.
     """
 
@@ -422,22 +420,22 @@ class AnchoredSynchronizer(Synchronizer):
 
     def fit(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         y: object = None,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
         confidence: Indexed[NumbersLike] | None = None,
     ) -> Self:
-        """Learn from performances, of which key-frames may be known.
+        """Learn from trials, of which key-frames may be known.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : ignored
             Present for API consistency.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            One row a performance, in its own frames, counted from its first row (fractions
+            One row a trial, in its own frames, counted from its first row (fractions
             allowed), increasing. NaN, or None for a whole row, where one is not known.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames per second of X. With it key-frames are seconds.
@@ -454,9 +452,9 @@ class AnchoredSynchronizer(Synchronizer):
         ------
         ValueError
             If the input breaks the contract, or the pattern does not exist or fit. If key-frames
-            are not increasing, inside their performance and equally many in all; if they look like
-            seconds, all below 1 or in the first fiftieth of a performance and not whole; if no
-            performance has one of them; or if performances have events whose frames are not their
+            are not increasing, inside their trial and equally many in all; if they look like
+            seconds, all below 1 or in the first fiftieth of a trial and not whole; if no
+            trial has one of them; or if trials have events whose frames are not their
             rows.
         """
         self._fit(X, keyframes, frame_rate, confidence)
@@ -480,22 +478,22 @@ class AnchoredSynchronizer(Synchronizer):
     # scikit-learn's takes whatever ``fit`` takes, without its name.
     def fit_transform(  # type: ignore[override]
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         y: object = None,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
         confidence: Indexed[NumbersLike] | None = None,
     ) -> Transformed:
-        """Fit, and warp the same performances.
+        """Fit, and warp the same trials.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : ignored
             Present for API consistency.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each performance, as for ``fit``.
+            Key-frames of each trial, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
         confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
@@ -511,22 +509,22 @@ class AnchoredSynchronizer(Synchronizer):
 
     def transform(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
         confidence: Indexed[NumbersLike] | None = None,
         *,
         fill: Literal["model"] | None = None,
     ) -> Transformed:
-        """Warp performances onto the clock of the pattern (Eq. 18).
+        """Warp trials onto the clock of the pattern (Eq. 18).
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances. Memory maps, and collections that give performances by index, are read in
+            Trials. Memory maps, and collections that give trials by index, are read in
             parts, once each, if no key-frames are given; rows of a matrix are loaded into memory.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each performance, as for ``fit``.
+            Key-frames of each trial, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
         confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
@@ -534,33 +532,33 @@ class AnchoredSynchronizer(Synchronizer):
         fill : {None, "model"}, default=None
             What becomes of NaN, which is what was hidden. None: it stays NaN, feature by feature.
             "model": it is filled from the mean of the warped training set (``examples_``) at the
-            same moment, moved by how far the performance is from the mean around the gap, and in
+            same moment, moved by how far the trial is from the mean around the gap, and in
             the features that are seen.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
-            ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
+            ``(n_sequences, P)`` for 2-D input; a ``(trial, frame)`` frame under
             ``set_output(transform="pandas")``.
         """
         return self._warp(X, fill, **self._given(X, keyframes, frame_rate, confidence))
 
     def match(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
         confidence: Indexed[NumbersLike] | None = None,
     ) -> Match:
-        """Match performances to the pattern: the warps of ``transform``.
+        """Match trials to the pattern: the warps of ``transform``.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
             Read in parts as by ``transform``.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each performance, as for ``fit``.
+            Key-frames of each trial, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
         confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
@@ -575,9 +573,9 @@ class AnchoredSynchronizer(Synchronizer):
         params = self._given(X, keyframes, frame_rate, confidence)
         if not params:
             return self._match_in_parts(X)
-        performances = self.check_performances(X)
-        performances = with_confidence(performances, params.pop("confidence", None))
-        return self._match(performances, **params)
+        trials = self.check_trials(X)
+        trials = with_confidence(trials, params.pop("confidence", None))
+        return self._match(trials, **params)
 
     def _given(self, X, keyframes, frame_rate, confidence=None) -> dict[str, Any]:
         """What is given, as arguments of ``_warp_part``."""
@@ -591,12 +589,12 @@ class AnchoredSynchronizer(Synchronizer):
             params["confidence"] = confidence
         return params
 
-    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        performances = with_confidence(performances, confidence)
-        return self._match(performances, keyframes, frame_rate).warp(performances)
+    def _warp_part(self, trials, keyframes=None, frame_rate=None, confidence=None):
+        trials = with_confidence(trials, confidence)
+        return self._match(trials, keyframes, frame_rate).warp(trials)
 
-    def _shares(self, performances, keyframes, frame_rate):
-        """Key-frames of performances as shares of them, by those of the fit; None if none are."""
+    def _shares(self, trials, keyframes, frame_rate):
+        """Key-frames of trials as shares of them, by those of the fit; None if none are."""
         if keyframes is None:
             return None
         if self.keyframes_ is None:
@@ -604,5 +602,5 @@ class AnchoredSynchronizer(Synchronizer):
                 f"Key-frames are given, and this {type(self).__name__} was fitted without any, so "
                 "it does not know where they are in the pattern. Fit it with keyframes=[...], too."
             )
-        rows = Keyframes(keyframes, len(performances), frame_rate)
-        return rows.shares(performances, len(self.keyframes_))
+        rows = Keyframes(keyframes, len(trials), frame_rate)
+        return rows.shares(trials, len(self.keyframes_))

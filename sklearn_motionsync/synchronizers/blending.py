@@ -1,4 +1,4 @@
-"""blend_performances: weighted means of performances, in their postures and their timing."""
+"""blend_trials: weighted means of trials, in their poses and their timing."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ from ..inputs.facts import compare_facts
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.tables import FRAME, labels_of
-from ..inputs.types import NumbersLike, PerformancesLike
+from ..inputs.types import NumbersLike, TrialsLike
 from ..inputs.wording import counted
 from ..matching.counting import ROUNDING, whole
 from ..matching.sizes import EQUAL
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
 
-__all__ = ["blend_performances"]
+__all__ = ["blend_trials"]
 
-# Smallest pace of an extrapolated blend, by that of the slowest performance.
+# Smallest pace of an extrapolated blend, by that of the slowest trial.
 _SLOWEST = 0.5
-# Largest number of frames of a blend, by that of the longest performance.
+# Largest number of frames of a blend, by that of the longest trial.
 _LONGEST = 100
-# Attributes of tables that hold the label of a performance.
-_LABELS = ("performance", "levels")
+# Attributes of tables that hold the label of a trial.
+_LABELS = ("trial", "levels")
 
 
-def blend_performances(
+def blend_trials(
     estimator: BaseEstimator | Match,
-    X: PerformancesLike,
+    X: TrialsLike,
     weights: NumbersLike | Mapping[Any, float],
     *,
     timing: NumbersLike | Mapping[Any, float] | None = None,
     skeleton: Skeleton | None = None,
     **params: Any,
 ) -> np.ndarray | pd.DataFrame:
-    """Blend performances: a weighted mean of their postures and of their timing.
+    """Blend trials: a weighted mean of their poses and of their timing.
 
     Frames that correspond on the clock of the pattern are averaged, and the blend has the averaged
     pace: from frame p of the pattern to the next one it takes
@@ -55,22 +55,22 @@ def blend_performances(
     each body, have the mean on the sphere with the smallest sum of squared angles, so that no limb
     becomes shorter. Lengths of limbs are averaged. Headings have a circular mean, and steps of the
     path are averaged along each body's heading. So are heights of the pelvis. Feet that stand in
-    the performances stand in the blend: the body follows them, and hips and knees bend by the rest.
+    the trials stand in the blend: the body follows them, and hips and knees bend by the rest.
 
     Parameters
     ----------
     estimator : Pipeline with a synchronizer, synchronizer, or Match
         Fitted; or the match of X, ``Match.from_estimator(pipe, X)``, for several blends or for
-        sequences recorded with the performances.
-    X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
-        Performances as the estimator takes them, without gaps; with a `Match` any sequences
+        sequences recorded with the trials.
+    X : list of arrays (n_frames_i, n_features), 3-D array, or (trial, frame) frame
+        Trials as the estimator takes them, without gaps; with a `Match` any sequences
         recorded with them. All have one frame rate.
     weights : array-like of shape (n_sequences,) or (n_rows, n_sequences), or dict
-        Weight of each performance; their sum is 1. Weights below 0 or above 1 extrapolate:
+        Weight of each trial; their sum is 1. Weights below 0 or above 1 extrapolate:
         1.5 and -0.5 exaggerate the differences of the first from the second. Several rows change
         evenly from the first to the last frame of the pattern: ``[[1, 0], [0, 1]]`` is a transition
-        from the first performance to the second, which continues at the place and in the heading of
-        the first. A dict has the weights of some performances by index or label.
+        from the first trial to the second, which continues at the place and in the heading of
+        the first. A dict has the weights of some trials by index or label.
     timing : array-like or dict, as weights, default=None
         Weights of the timing; by default ``weights``.
     skeleton : Skeleton, default=None
@@ -82,31 +82,31 @@ def blend_performances(
     Returns
     -------
     ndarray, shape (n_frames, n_features), or DataFrame
-        Of the kind and dtype of the performances of X. Frames of a table are numbered from 0, or
+        Of the kind and dtype of the trials of X. Frames of a table are numbered from 0, or
         are times from 0 if those of X are.
 
     Raises
     ------
     ValueError
-        If the weights are not one a performance or not of sum 1; if X breaks the contract for
-        performances, or that of the skeleton; if there is no such performance; if extrapolation
+        If the weights are not one a trial or not of sum 1; if X breaks the contract for
+        trials, or that of the skeleton; if there is no such trial; if extrapolation
         leaves the blend no time, or makes it a hundred times as long as the longest of X.
 
     See Also
     --------
     sklearn_motionsync.display.SkeletonDisplay : Draws the blend, and lets it move.
-    ActionModel.sample : Random mixtures of the training performances.
+    ActionModel.sample : Random mixtures of the training trials.
 
     Notes
     -----
-    A weight of 1 gives that performance back. Negative weights extrapolate along great circles from
+    A weight of 1 gives that trial back. Negative weights extrapolate along great circles from
     the mean of the directions with positive weights. Opposite directions have no mean: the one of
     the largest weight, the first of equal ones, is used. Extrapolated lengths and paces are at
-    least half the smallest one of the performances.
+    least half the smallest one of the trials.
 
     A foot stands while its ankle, heel or toe is slow, against the fastest joint of the body, and
     as low as the other foot. It then moves along the floor, and is as high, as on average in the
-    performances with positive weights. So negative weights exaggerate steps, but not how feet slip.
+    trials with positive weights. So negative weights exaggerate steps, but not how feet slip.
     Feet that slip in a recording, or go with a treadmill, do so in its blends. Bodies in a picture
     (``n_dims=2``), and legs without hip, knee and ankle, are left as they are.
 
@@ -114,17 +114,17 @@ def blend_performances(
     --------
     >>> from sklearn.pipeline import make_pipeline
     >>> from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-    >>> from sklearn_motionsync import blend_performances
+    >>> from sklearn_motionsync import blend_trials
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, random_state=0)
     >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer())
-    >>> between = blend_performances(pipe.fit(bunch.data), bunch.data, {0: 0.5, 3: 0.5})
+    >>> between = blend_trials(pipe.fit(bunch.data), bunch.data, {0: 0.5, 3: 0.5})
     >>> len(bunch.data[0]), len(between), len(bunch.data[3])
     (101, 105, 108)
 
     The movement of the first at the pace of the fourth:
 
-    >>> moved = blend_performances(pipe, bunch.data, {0: 1}, timing={3: 1})
+    >>> moved = blend_trials(pipe, bunch.data, {0: 1}, timing={3: 1})
     >>> len(moved)
     108
     """
@@ -138,7 +138,7 @@ def blend_performances(
         JointPositions(skeleton).fit(sequences)
     match = estimator
     if not isinstance(estimator, Match):
-        match = route_to_synchronizer(estimator, X, params, "blend_performances").match()
+        match = route_to_synchronizer(estimator, X, params, "blend_trials").match()
     elif params:
         raise TypeError(f"A Match takes no {sorted(params)}.")
     warps = match.frames(list(map(len, arrays)))
@@ -152,7 +152,7 @@ def blend_performances(
 
 
 def _read(X, may_be_rows):
-    """Performances as they were given, as arrays, and whether they are univariate rows."""
+    """Trials as they were given, as arrays, and whether they are univariate rows."""
     sequences = as_collection(X)
     is_rows = sequences is None
     if is_rows:
@@ -195,7 +195,7 @@ def _weights(given, labels, n_frames, what) -> np.ndarray:
     rows = np.atleast_2d(as_numbers(given, what, dtype=np.float64))
     if rows.ndim != 2 or rows.shape[1] != len(labels):
         raise ValueError(
-            f"{what} must be one for each of the {counted(len(labels), 'performance')}, or rows of "
+            f"{what} must be one for each of the {counted(len(labels), 'trial')}, or rows of "
             f"them; got shape {np.shape(given)}. For some, give a dict: {{0: 0.5, 1: 0.5}}."
         )
     check_finite(rows, f"{what}, row")
@@ -217,22 +217,22 @@ def _weights(given, labels, n_frames, what) -> np.ndarray:
 
 
 def _index(label, labels, what):
-    """The index of a performance that is given by its label or index."""
+    """The index of a trial that is given by its label or index."""
     if label in labels:
         return labels.index(label)
     numbered = any(isinstance(name, Integral) for name in labels)
     if isinstance(label, Integral) and not numbered and 0 <= label < len(labels):
         return int(label)
-    raise ValueError(f"{what}: there is no performance {label!r}; labels are {labels[:8]}.")
+    raise ValueError(f"{what}: there is no trial {label!r}; labels are {labels[:8]}.")
 
 
 def _blend_pace(warps, timing):
-    """The frames of each performance at the frames of a blend, and those of the clock.
+    """The frames of each trial at the frames of a blend, and those of the clock.
 
     Parameters
     ----------
     warps : ndarray, shape (n_sequences, P)
-        The frame of each performance at each frame of the clock.
+        The frame of each trial at each frame of the clock.
     timing : ndarray, shape (P, n_sequences)
 
     Returns
@@ -250,7 +250,7 @@ def _blend_pace(warps, timing):
     last = whole(elapsed[-1])
     if not 1 <= last <= _LONGEST * warps.max():
         raise ValueError(
-            f"Weights beyond 0 and 1 give a blend of {last + 1} frames; the longest performance "
+            f"Weights beyond 0 and 1 give a blend of {last + 1} frames; the longest trial "
             f"has {warps.max() + 1:.0f}: give timing= weights between 0 and 1."
         )
     clock = np.arange(warps.shape[1])
@@ -261,7 +261,7 @@ def _blend_pace(warps, timing):
 
 
 def _blend(arrays, frames, weights, skeleton):
-    """The blend of performances with weights other than 0, (n_frames, n_features)."""
+    """The blend of trials with weights other than 0, (n_frames, n_features)."""
     used = weights.any(axis=1)
     chosen = [x.astype(np.float64) for x, u in zip(arrays, used, strict=True) if u]
     frames, weights = frames[used], weights[used]
@@ -271,7 +271,7 @@ def _blend(arrays, frames, weights, skeleton):
 
 
 def _like(sequences, array, name, rates):
-    """An array as a performance of the kind of others, which have these frame rates."""
+    """An array as a trial of the kind of others, which have these frame rates."""
     x = sequences[0]
     if not isinstance(x, pd.DataFrame):
         return array
@@ -283,7 +283,7 @@ def _like(sequences, array, name, rates):
 
 
 def _clock(sequences, n_frames, name):
-    """Frames from 0; or times, if all performances have times of one frame rate."""
+    """Frames from 0; or times, if all trials have times of one frame rate."""
     indices = [x.index for x in sequences if isinstance(x, pd.DataFrame)]
     if not all(index.dtype.kind in "fmM" for index in indices):
         return pd.RangeIndex(n_frames, name=name)

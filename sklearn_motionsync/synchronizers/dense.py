@@ -1,4 +1,4 @@
-"""DenseSynchronizer: dense matching to the median performance (Eqs. 7-19)."""
+"""DenseSynchronizer: dense matching to the median trial (Eqs. 7-19)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..inputs.keyframes import Keyframes
 from ..inputs.types import (
     Cost,
     Indexed,
-    PerformanceLike,
-    PerformancesLike,
     RandomState,
     SupportsArray,
+    TrialLike,
+    TrialsLike,
     ValuesLike,
 )
 from ..inputs.validation import names_of_input
@@ -45,7 +45,7 @@ __all__ = ["DenseSynchronizer"]
 class DenseSynchronizer(AnchoredSynchronizer):
     """Align trials in time: warp all of them to the most typical one.
 
-    That trial is the template, here the *pattern*. Every trial is matched to it by all of its
+    That trial is the pattern, here the *pattern*. Every trial is matched to it by all of its
     signals at once. A warp then brings the same moments together. The time shifts are a result,
     too.
 
@@ -76,7 +76,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
     >>> sync.transform(trials)
     Traceback (most recent call last):
         ...
-    ValueError: Performance 2 is NaN in every frame and feature: nothing of it was seen, ...
+    ValueError: Trial 2 is NaN in every frame and feature: nothing of it was seen, ...
 
     The defaults suit most data. Four parameters depend on the data or on the question. The others
     were set by measurements, or are for many trials and long jobs.
@@ -85,11 +85,11 @@ class DenseSynchronizer(AnchoredSynchronizer):
     ----------
     n_frames : int, default=None
         Frames of every aligned trial. Set it if you want a number of your own, such as 101 for 0 to
-        100 %. By default it is the median length of the trials, or the length of a template that is
+        100 %. By default it is the median length of the trials, or the length of a pattern that is
         given as an array. Time grows with its square.
     pattern : "median", int or array (n_frames, n_features), default="median"
-        The template: the most typical trial, a trial by its index, or an array. Set it if new
-        trials are to be aligned to a template that you have.
+        The pattern: the most typical trial, a trial by its index, or an array. Set it if new
+        trials are to be aligned to a pattern that you have.
     refine : "auto" or bool, default="auto"
         Whether to place every moment to a fraction of a frame by the poses themselves. That helps
         with repeated trials of a single source, which differ by noise and gain only, and harms with
@@ -103,11 +103,11 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     Other Parameters
     ----------------
-    cost : {"velocity", "elastic", "posture"}, default="velocity"
+    cost : {"velocity", "elastic", "pose"}, default="velocity"
         What is compared. ``"velocity"``: velocities; at the local rate rho, ``v_n`` with ``(0.8 +
         0.2 rho) v_m``. ``"elastic"``: velocities divided by the square root of the speed. Its
         weights make the distance, of Fisher and Rao, independent of the timing of either trial.
-        ``"posture"``: poses, as in the paper.
+        ``"pose"``: poses, as in the paper.
     smoothness : float, default=0.003
         Weight of changes of pace, a pure number. ``mu`` of Eq. 12 is ``smoothness`` times the mean
         squared norm of what is compared.
@@ -128,7 +128,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
     max_fit : int, default=None
         Size, at least 2, of a random sample from which ``fit`` learns everything. The other trials
         are not checked. They are not even read if ``X`` gives trials by index, so time and memory
-        of a fit do not grow with their number. A template given by its index is in the sample.
+        of a fit do not grow with their number. A pattern given by its index is in the sample.
         None takes all trials.
     random_state : int, RandomState instance or None, default=0
         Draws the sample of ``max_fit``, and the trials that all are compared with where there are
@@ -142,7 +142,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
     Attributes
     ----------
     pattern_ : ndarray, shape (P, n_features)
-        The template, of ``P`` frames.
+        The pattern, of ``P`` frames.
     pattern_index_ : int or None
         Its index in the training set; None if it was given as an array.
     n_frames_ : int
@@ -150,10 +150,10 @@ class DenseSynchronizer(AnchoredSynchronizer):
     global_distances_ : ndarray, shape (n_sequences,)
         ``C_n`` of Eq. 19, the sum of the distances of each trial to all others. Of more than 100
         trials it is estimated from the distances to 100 of them, drawn at random: its standard
-        error is 4 to 8 % of it, and in six sets of 180 to 300 trials the template's own sum was at
+        error is 4 to 8 % of it, and in six sets of 180 to 300 trials the pattern's own sum was at
         most 2 % above the smallest. With a learnt metric the distances may be those of fewer
         frames, in single precision, scaled to ``P``, so they differ a little from sums of the
-        ``distances`` of `match`. NaN if the template was given, and for trials outside of the
+        ``distances`` of `match`. NaN if the pattern was given, and for trials outside of the
         sample.
     sample_ : ndarray of int
         Indices of the training trials: all, or ``max_fit`` of them. ``lengths_`` and ``examples_``
@@ -162,7 +162,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         The learnt metric, in single precision; None without one. ``share``: the share of every
         signal in what is compared, about 0 for noise. ``energy``: its share in the velocities,
         which are compared without a metric; if one of several exceeds 0.95 there is a warning.
-        ``performances``: the indices of the trials it was learnt from.
+        ``trials``: the indices of the trials it was learnt from.
     evidence_ : Bunch
         Whether the trials that the metric is learnt from support their warps. ``remaining``: the
         share of their differences that matching leaves. ``inconsistency``: how far, on average, the
@@ -176,11 +176,11 @@ class DenseSynchronizer(AnchoredSynchronizer):
         Indices of the trials that vote, at most ``consensus``. If only some trials have key-frames,
         they are the exemplars.
     keyframes_ : ndarray, shape (n_keyframes,), or None
-        Key-frames of the template, in frames of the clock: its own, or learnt from the trials that
+        Key-frames of the pattern, in frames of the clock: its own, or learnt from the trials that
         have them. None if none were given.
     unexplained_variance_ : float
         The variance that is left after matching, less what white noise explains, as a share of the
-        template's: the median over at most 20 trials, evenly spaced. Copies of one source have at
+        pattern's: the median over at most 20 trials, evenly spaced. Copies of one source have at
         most 0.022 at any noise, whole movements of people 0.03 and more. Single signals of people
         may have less, and are then refined by mistake: set ``refine=False``. NaN unless
         ``refine="auto"`` asks for it, and without trials that have no gaps.
@@ -188,7 +188,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         Whether warps are refined.
     sharpening_ : Bunch or None
         What sharpens warps; None if nothing does. ``width``: smoothing of velocities, as a share of
-        the trial. ``agreement``: how well the trials that vote agree with the template in the
+        the trial. ``agreement``: how well the trials that vote agree with the pattern in the
         velocity of every signal, a correlation; NaN for noise. ``trust``, shape (P,): from 0 to 1,
         how far warps go to where the last match places them. It follows from the agreement, and
         from how clearly velocities change there.
@@ -200,7 +200,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
     examples_ : ndarray, shape (min(n_samples_fit, 64), P, n_features)
         Training trials linearly normalised: all, or 64 of them, evenly spaced.
     features_ : callable
-        Turns poses on the frames of the template into what is compared.
+        Turns poses on the frames of the pattern into what is compared.
     n_features_in_ : int
         Signals of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -229,9 +229,9 @@ class DenseSynchronizer(AnchoredSynchronizer):
        Both ends are pinned, and the local rate is between 0 and ``max_rate``. The points x are
        velocities and poses in the metric (see ``cost``). All pairs are matched, or of more than 100
        trials each with 100 drawn ones.
-    4. ``training.pattern_of``: the template is the trial with the smallest sum ``C_n = sum_m
+    4. ``training.pattern_of``: the pattern is the trial with the smallest sum ``C_n = sum_m
        D_{n,m}`` (Eq. 19), the "median".
-    5. ``learning.let_exemplars_vote``: some typical trials, the exemplars, vote. The template is
+    5. ``learning.let_exemplars_vote``: some typical trials, the exemplars, vote. The pattern is
        matched to a trial directly, and by way of each exemplar. The median of these paths outvotes
        a path that went astray. Its time shifts are smoothed by a Gaussian of 2 % of the trial.
     6. ``learning.finish_warps``: trials are matched once more, near their warps and by velocities
@@ -283,12 +283,12 @@ class DenseSynchronizer(AnchoredSynchronizer):
     }
 
     metric_: Any
-    _SMALLER = "fewer frames or performances. Or learn from some: max_fit=1000"
+    _SMALLER = "fewer frames or trials. Or learn from some: max_fit=1000"
 
     def __init__(
         self,
         n_frames: int | None = None,
-        pattern: PerformanceLike | int | Literal["median"] = "median",
+        pattern: TrialLike | int | Literal["median"] = "median",
         *,
         refine: bool | Literal["auto"] = "auto",
         max_offset: float | Literal["auto"] = "auto",
@@ -322,7 +322,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
     def paper(cls, **params: Any) -> Self:
         """Make a synchronizer with the settings of the paper.
 
-        Postures are compared, rates end at 2, and a warp is the direct path to the pattern: no
+        Poses are compared, rates end at 2, and a warp is the direct path to the pattern: no
         metric is learnt, no exemplars vote, and nothing is refined.
 
         Parameters
@@ -338,9 +338,9 @@ class DenseSynchronizer(AnchoredSynchronizer):
         --------
         >>> from sklearn_motionsync import DenseSynchronizer
         >>> DenseSynchronizer.paper(n_frames=100)
-        DenseSynchronizer(consensus=0, cost='posture', max_rate=2, n_frames=100)
+        DenseSynchronizer(consensus=0, cost='pose', max_rate=2, n_frames=100)
         """
-        return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0, **params})
+        return cls(**{"cost": "pose", "max_rate": 2, "consensus": 0, **params})
 
     def _read_training_set(self, X, confidence=None):
         sample, numbers, population = draw_sample(X, self.max_fit, self.pattern, self.random_state)
@@ -391,7 +391,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
             "n_frames_": clock.n_frames,
             "global_distances_": distances,
             "sample_": numbers,
-            "metric_": metric and Bunch(**metric | {"performances": numbers[metric.performances]}),
+            "metric_": metric and Bunch(**metric | {"trials": numbers[metric.trials]}),
             "evidence_": compared.evidence,
             "mu_": float(features.back(pairs.matcher.trellis.mu)),
             "exemplars_": numbers[vote.exemplars],
@@ -408,8 +408,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
             "_warper": final.warper,
         }
 
-    def _match(self, performances, keyframes=None, frame_rate=None):
-        arrays, shares = self._for_warper(performances, keyframes, frame_rate)
+    def _match(self, trials, keyframes=None, frame_rate=None):
+        arrays, shares = self._for_warper(trials, keyframes, frame_rate)
         distances, times = warp_in_portions(
             self._warper, arrays, n_jobs=self.n_jobs, begin=self._progress, name="warping"
         )
@@ -424,7 +424,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     def calibrate(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         keyframes: Indexed[ValuesLike | None] | SupportsArray,
         frame_rate: float | ValuesLike | None = None,
     ) -> Self:
@@ -435,10 +435,10 @@ class DenseSynchronizer(AnchoredSynchronizer):
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances, best of subjects that ``fit`` has not seen. They are matched without
+            Trials, best of subjects that ``fit`` has not seen. They are matched without
             their key-frames.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame
-            Moments of each, as for ``fit``: at least 9, better some dozens. Those of the template
+            Moments of each, as for ``fit``: at least 9, better some dozens. Those of the pattern
             are ``keyframes_``, or else the median of the frames that these moments meet.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
@@ -454,11 +454,11 @@ class DenseSynchronizer(AnchoredSynchronizer):
             If there are too few key-frames; and as from ``fit``.
         """
         check_is_fitted(self)
-        performances = self.check_performances(X)
-        keyframe_rows = Keyframes(keyframes, len(performances), frame_rate)
+        trials = self.check_trials(X)
+        keyframe_rows = Keyframes(keyframes, len(trials), frame_rate)
         count = None if self.keyframes_ is None else len(self.keyframes_)
-        frames = keyframe_rows.shares(performances, count) * (self.n_frames_ - 1)
-        match = self._match(performances)
+        frames = keyframe_rows.shares(trials, count) * (self.n_frames_ - 1)
+        match = self._match(trials)
         self.interval_factor_ *= calibrated_factor(match, self.keyframes_, frames)
         return self
 
@@ -479,18 +479,18 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     def disparity_space(
         self,
-        X: PerformancesLike,
-        performance: int = 0,
+        X: TrialsLike,
+        trial: int = 0,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
     ) -> Bunch:
-        """The disparity space of the pattern and one performance, and the path through it (Fig. 2).
+        """The disparity space of the pattern and one trial, and the path through it (Fig. 2).
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-        performance : int, default=0
+            Trials; the rows of a 2-D array are univariate ones.
+        trial : int, default=0
             The index of one of them.
         keyframes, frame_rate : as for ``match``, default=None
             Key-frames draw the path. They are no part of the costs.
@@ -506,18 +506,18 @@ class DenseSynchronizer(AnchoredSynchronizer):
         Raises
         ------
         ValueError
-            If there is no such performance.
+            If there is no such trial.
         """
-        performances = self.check_performances(X)
-        whole = isinstance(performance, Integral) and not isinstance(performance, bool)
-        if not whole or not 0 <= performance < len(performances):
+        trials = self.check_trials(X)
+        whole = isinstance(trial, Integral) and not isinstance(trial, bool)
+        if not whole or not 0 <= trial < len(trials):
             raise ValueError(
-                f"performance={performance} is out of range: there are {len(performances)} "
-                f"performances, 0 to {len(performances) - 1}."
+                f"trial={trial} is out of range: there are {len(trials)} "
+                f"trials, 0 to {len(trials) - 1}."
             )
         warper = self._warper
-        arrays, _ = self._for_warper(performances, keyframes, frame_rate)
-        positions = warper.positions([arrays[performance]])
+        arrays, _ = self._for_warper(trials, keyframes, frame_rate)
+        positions = warper.positions([arrays[trial]])
         frames, offsets, costs, path = warper.disparity_space(positions)
         costs = warper.matcher.features.back(costs)
         return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)

@@ -1,4 +1,4 @@
-"""How sure a match is: intervals of its times, and which performances are doubtful."""
+"""How sure a match is: intervals of its times, and which trials are doubtful."""
 
 import threading
 from collections.abc import Callable, Iterable
@@ -16,13 +16,13 @@ from ..utils.parallel import one_blas_thread
 
 __all__ = ["Intervals", "calibrated_factor", "intervals_of", "joined"]
 
-# A performance is doubtful if the share of its movement that no path explains, times the widest
+# A trial is doubtful if the share of its movement that no path explains, times the widest
 # interval of 90 %, as a share of the clip, is larger: docs/design.md.
 _DOUBTFUL = 0.2
 
 
 class Measured(NamedTuple):
-    """How far the times of some performances may be off.
+    """How far the times of some trials may be off.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Measured(NamedTuple):
     is_normal : ndarray of bool, shape (n_sequences,)
         As of `Uncertainty`.
     reasons : list of str or None
-        Why each performance is doubtful.
+        Why each trial is doubtful.
     """
 
     widths: np.ndarray
@@ -62,7 +62,7 @@ class Intervals:
         self._lock = threading.Lock()
 
     def measured(self) -> Measured:
-        """What is known of the performances, which are not needed any more."""
+        """What is known of the trials, which are not needed any more."""
         with self._lock:
             if self._measured is None:
                 self._measured = self._measure()
@@ -81,7 +81,7 @@ class Intervals:
 
 
 def joined(parts: Iterable[Measured]) -> Measured:
-    """What was measured of performances that were matched in parts."""
+    """What was measured of trials that were matched in parts."""
     measured = list(parts)
     return Measured(
         np.concatenate([each.widths for each in measured]),
@@ -134,9 +134,9 @@ def calibrated_factor(match, pattern, known):
     Parameters
     ----------
     match : Match
-        Of performances, without their key-frames.
+        Of trials, without their key-frames.
     pattern : ndarray, shape (n_keyframes,), or None
-        Key-frames of the pattern, in frames; None for the median of what performances meet.
+        Key-frames of the pattern, in frames; None for the median of what trials meet.
     known : ndarray, shape (n_sequences, n_keyframes)
         In frames of the clock; NaN where one is not known.
 
@@ -158,14 +158,14 @@ def calibrated_factor(match, pattern, known):
     rank = whole(0.9 * (n + 1), "up")
     if rank > n:
         raise ValueError(
-            f"{counted(n, 'key-frame')} of the performances do not tell 90 %: at least 9 are "
+            f"{counted(n, 'key-frame')} of the trials do not tell 90 %: at least 9 are "
             "needed, and some dozens tell it well."
         )
     return float(np.sort(errors / widths)[rank - 1])
 
 
 def _reasons(shares, widest, evidence):
-    """Why performances are doubtful; None for those that are not."""
+    """Why trials are doubtful; None for those that are not."""
     reasons = []
     for share, width in zip(shares, widest, strict=True):
         why = None

@@ -108,7 +108,7 @@ def learn_metric(clock, *, cost, metric, consensus, smoothness, max_offset, max_
         settings = PathSettings(smoothness, narrow, max_rate)
         return MetricStep(plain, settings, None, weigh_evidence(None, 0))
     features, share, energy, evidence = learnt
-    described = Bunch(share=share, energy=energy, performances=rows)
+    described = Bunch(share=share, energy=energy, trials=rows)
     return MetricStep(features, settings, described, weigh_evidence(evidence, len(rows)))
 
 
@@ -141,7 +141,7 @@ def match_pairs(clock, step, wanted, *, trials, names, random_state, n_jobs, pro
     step : MetricStep
     wanted : bool
         Whether distances are wanted; else only the matcher is.
-    trials : Performances
+    trials : Trials
         The same training set, for a warning if a single feature has nearly all of the energy.
     names : sequence or None
         Of the features.
@@ -411,8 +411,8 @@ def weigh_evidence(evidence, n_trials):
     weak = n_trials >= _ENOUGH and remaining > _REMAINING and inconsistency > _INCONSISTENT
     if weak:
         warnings.warn(
-            f"Matching leaves {remaining:.0%} of the differences between these performances, and "
-            "by way of a third performance a moment lands "
+            f"Matching leaves {remaining:.0%} of the differences between these trials, and "
+            "by way of a third trial a moment lands "
             f"{inconsistency:.2f} times a typical offset away (evidence_; {_REMAINING:.0%} and "
             f"{_INCONSISTENT} are the limits): the warps explain little. Compare them with "
             "LinearSynchronizer, and check that all show one movement, cut at the same moments. "
@@ -463,7 +463,7 @@ def sums_in_portions(matcher, positions, references, compared, *, n_jobs, progre
     cells = n_references * compared.shape[1] * (2 * matcher.trellis.width + 1)
     size = min(TILE_BASES, max(1, PORTION_CELLS // cells))
     slices = even_slices(n_trials, size)
-    name = f"comparing {n_trials} with {counted(n_references, 'performance')}"
+    name = f"comparing {n_trials} with {counted(n_references, 'trial')}"
     step = progress.stage(name, len(slices))
     if n_trials == n_references:
         # The features of all trials are there.

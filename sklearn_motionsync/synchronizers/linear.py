@@ -19,17 +19,17 @@ __all__ = ["LinearSynchronizer"]
 class LinearSynchronizer(AnchoredSynchronizer):
     """Linear normalisation (Eq. 7): the same number of frames, no matching.
 
-    The baseline of all other synchronizers: each performance is stretched evenly to ``n_frames``.
+    The baseline of all other synchronizers: each trial is stretched evenly to ``n_frames``.
     If key-frames are given, it is stretched evenly between them, so that they coincide with those
     of the pattern, as in Figs. 1c and 3c of the paper. A key-frame that is not known is left out.
 
     Parameters
     ----------
     n_frames : int, default=None
-        Frames of the common clock; by default the median length of the performances, or
+        Frames of the common clock; by default the median length of the trials, or
         the length of a pattern given as an array.
     pattern : "median", int or array (n_frames, n_features), default="median"
-        The reference of ``match``: the performance with the smallest sum of distances (Eq. 19,
+        The reference of ``match``: the trial with the smallest sum of distances (Eq. 19,
         after warping by the key-frames if there are any), one chosen by its index, or another one.
 
     Attributes
@@ -41,30 +41,30 @@ class LinearSynchronizer(AnchoredSynchronizer):
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19 for every performance; NaN if the pattern was given.
+        ``C_n`` of Eq. 19 for every trial; NaN if the pattern was given.
     keyframes_ : ndarray, shape (n_keyframes,), or None
         Key-frames of the pattern, in frames of the clock: its own, and for those it lacks the
         median of where those of the others meet it. None if none were given.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     lengths_ : ndarray of int, shape (n_sequences,)
-        Numbers of frames of the training performances.
+        Numbers of frames of the training trials.
     examples_ : ndarray, shape (min(n_sequences, 64), P, n_features)
-        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+        Training trials linearly normalised: all, or 64 of them, evenly spaced.
     features_ : callable
-        Turns postures on the clock into the features that searches compare.
+        Turns poses on the clock into the features that searches compare.
     feature_names_in_ : ndarray of str
         Names of the features; only if the input had names.
 
     See Also
     --------
-    DenseSynchronizer : Follows the changes of pace within a performance, and between key-frames.
+    DenseSynchronizer : Follows the changes of pace within a trial, and between key-frames.
     io.keyframes_from_events : Makes key-frames of a table of events.
 
     Notes
     -----
-    After a fit with key-frames nothing else aligns performances, so ``match`` and ``transform``
-    need them, too; None in the place of a row says that none of a performance are known. They are
+    After a fit with key-frames nothing else aligns trials, so ``match`` and ``transform``
+    need them, too; None in the place of a row says that none of a trial are known. They are
     metadata: in a Pipeline enable scikit-learn's metadata routing and request them with
     ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``, for scorers
     with ``set_score_request(keyframes=True)``. Scorers that are called directly, displays and
@@ -85,19 +85,19 @@ class LinearSynchronizer(AnchoredSynchronizer):
     def _given(self, X, keyframes, frame_rate, confidence=None):
         if keyframes is None and getattr(self, "keyframes_", None) is not None:
             raise MissingMetadata(
-                "The synchronizer was fitted with key-frames: give those of these performances too",
+                "The synchronizer was fitted with key-frames: give those of these trials too",
                 "keyframes",
             )
         return super()._given(X, keyframes, frame_rate, confidence)
 
-    def _match(self, performances, keyframes=None, frame_rate=None):
-        shares, n_frames = self._shares(performances, keyframes, frame_rate), self.n_frames_
+    def _match(self, trials, keyframes=None, frame_rate=None):
+        shares, n_frames = self._shares(trials, keyframes, frame_rate), self.n_frames_
         if shares is None:
-            times = np.tile(np.arange(n_frames, dtype=np.float64), (len(performances), 1))
+            times = np.tile(np.arange(n_frames, dtype=np.float64), (len(trials), 1))
         else:
             times = piecewise_linear(self.keyframes_, shares * (n_frames - 1), n_frames)
-        arrays, distances = list(self._without_gaps(performances)), np.empty(len(performances))
-        for rows in even_slices(len(performances), BATCH):
+        arrays, distances = list(self._without_gaps(trials)), np.empty(len(trials))
+        for rows in even_slices(len(trials), BATCH):
             if shares is None:
                 warped = normalise(arrays[rows], n_frames)
             else:
@@ -112,7 +112,7 @@ class LinearSynchronizer(AnchoredSynchronizer):
         if training.keyframes is None:
             return self._learnt(training, clock, pattern, clock.poses) | {"keyframes_": None}
         keyframes = training.keyframes * (clock.n_frames - 1)
-        # On the mean key-frames all performances are comparable, as on one clock.
+        # On the mean key-frames all trials are comparable, as on one clock.
         mean = np.maximum.accumulate(np.nanmean(keyframes, axis=0))
         times = piecewise_linear(mean, keyframes, clock.n_frames)
         comparable = clock.unit(sample(training.trials, times, clock.n_frames))

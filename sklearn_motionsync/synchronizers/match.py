@@ -1,4 +1,4 @@
-"""Match: warps of performances to the pattern, the result of every synchronizer."""
+"""Match: warps of trials to the pattern, the result of every synchronizer."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from ..inputs.resampling import as_frame_rates
 from ..inputs.types import (
     Labels,
     NumbersLike,
-    PerformancesLike,
     Transformed,
+    TrialsLike,
     Unit,
     ValuesLike,
 )
@@ -48,14 +48,14 @@ __all__ = [
 STANDARD = 0.6827
 # Units of time of the clock of the pattern, and their symbols.
 UNITS = {"frames": "frames", "percent": "%", "seconds": "s"}
-# Performances in the table for notebooks.
+# Trials in the table for notebooks.
 _SHOWN = 10
 # The smallest rate, so that logarithms are finite.
 _SLOWEST = 0.01
 
 
 class Match:
-    """Warps of a set of performances to the pattern.
+    """Warps of a set of trials to the pattern.
 
     The ``match`` of a synchronizer returns one, and `from_estimator` that of a whole pipeline.
 
@@ -63,9 +63,9 @@ class Match:
     ----------
     times : array-like, shape (n_sequences, P)
         ``tau(p)``, from 0 to ``P - 1``: the frame that corresponds to frame p of the pattern, in
-        performances that are linearly normalised to its length.
+        trials that are linearly normalised to its length.
     distances : array-like, shape (n_sequences,), default=None
-        Distance of each performance from the pattern; NaN by default.
+        Distance of each trial from the pattern; NaN by default.
     intervals : Intervals, default=None
         What `DenseSynchronizer` gives for ``interval`` and ``doubtful``.
 
@@ -84,7 +84,7 @@ class Match:
     ------
     ValueError
         If times are not of shape (n_sequences, P) with at least two frames, decrease, or are not
-        within the clock; or if there is not one distance a performance.
+        within the clock; or if there is not one distance a trial.
 
     Notes
     -----
@@ -97,8 +97,8 @@ class Match:
     >>> X = [np.arange(5.0)[:, None], np.arange(9.0)[:, None] / 2]
     >>> match = LinearSynchronizer(n_frames=5).fit(X).match(X)
     >>> match
-    Match(2 performances on 5 frames)
-    >>> match.frames(X)[1].tolist()  # the second performance has nine frames
+    Match(2 trials on 5 frames)
+    >>> match.frames(X)[1].tolist()  # the second trial has nine frames
     [0.0, 2.0, 4.0, 6.0, 8.0]
     >>> match.seconds(X, frame_rate=4)[1].tolist()
     [0.0, 0.5, 1.0, 1.5, 2.0]
@@ -106,7 +106,7 @@ class Match:
     >>> match.warp(forces)[1].ravel().tolist()
     [0.0, 20.0, 40.0, 60.0, 80.0]
 
-    Timing is a result, too: this performance is late by up to a quarter of the clock.
+    Timing is a result, too: this trial is late by up to a quarter of the clock.
 
     >>> late = Match([[0, 2, 3, 3.5, 4]])
     >>> late.offsets_in("percent").tolist()
@@ -126,7 +126,7 @@ class Match:
         times = np.array(as_numbers(times, "times", dtype=np.float64))
         if times.ndim != 2 or times.shape[1] < 2:
             raise ValueError(
-                "times must have shape (n_sequences, P), one row a performance and at least 2 "
+                "times must have shape (n_sequences, P), one row a trial and at least 2 "
                 f"frames; got {times.shape}."
             )
         n_sequences, n_frames = times.shape
@@ -134,14 +134,14 @@ class Match:
         if not (times.min(initial=0) >= 0 and times.max(initial=0) <= n_frames - 1):
             i = int(np.argmin(((times >= 0) & (times <= n_frames - 1)).all(axis=1)))
             raise ValueError(
-                f"Performance {i}: times must be from 0 to P - 1 = {n_frames - 1}, in frames of "
+                f"Trial {i}: times must be from 0 to P - 1 = {n_frames - 1}, in frames of "
                 f"the pattern, got {times[i].min():g} to {times[i].max():g}."
             )
         back = np.diff(times) < -ROUNDING * n_frames
         if back.any():
             i, p = np.argwhere(back)[0]
             raise ValueError(
-                f"Performance {i}: times must not decrease, but {times[i, p + 1]:g} at frame "
+                f"Trial {i}: times must not decrease, but {times[i, p + 1]:g} at frame "
                 f"{p + 1} follows {times[i, p]:g}."
             )
         np.maximum.accumulate(times, axis=1, out=times)
@@ -150,7 +150,7 @@ class Match:
         distances = np.array(as_numbers(distances, "distances"))
         if distances.shape != (n_sequences,):
             raise ValueError(
-                f"distances must be one for each of the {counted(n_sequences, 'performance')}, got "
+                f"distances must be one for each of the {counted(n_sequences, 'trial')}, got "
                 f"shape {distances.shape}."
             )
         self.times, self.distances = times, distances
@@ -160,7 +160,7 @@ class Match:
     def offsets(self) -> np.ndarray:
         """``Delta(p) = tau(p) - p``, in frames of the pattern: (n_sequences, P).
 
-        Positive where a performance is later than the pattern, negative where it is earlier.
+        Positive where a trial is later than the pattern, negative where it is earlier.
         """
         return self.times - np.arange(self.times.shape[1])
 
@@ -169,7 +169,7 @@ class Match:
         """Local rates ``d tau / dp``: (n_sequences, P).
 
         Central differences of ``times``, one-sided at both ends, and at least 0.01. The log rate,
-        ``np.log(match.rates)``, is 0 at the pace of the pattern, positive where a performance is
+        ``np.log(match.rates)``, is 0 at the pace of the pattern, positive where a trial is
         slower and its offset grows, negative where it is faster.
         """
         return np.maximum(np.gradient(self.times, axis=1), _SLOWEST)
@@ -178,13 +178,13 @@ class Match:
         self,
         coverage: float = 0.9,
         unit: Unit = "frames",
-        X: PerformancesLike | ValuesLike | None = None,
+        X: TrialsLike | ValuesLike | None = None,
         frame_rate: float | ValuesLike | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """How sure ``times`` are: where a performance shows the moments of the pattern.
+        """How sure ``times`` are: where a trial shows the moments of the pattern.
 
         For a key moment of the pattern, the interval holds the time of the same moment of a
-        performance with this probability. It is pointwise: of many moments a share of
+        trial with this probability. It is pointwise: of many moments a share of
         ``1 - coverage`` is outside. Its width follows from the paths of the trellis that cost
         hardly more than the best one, and from the share of the movement that no warp explains.
         Constants turn them into per cent. They were fitted to key moments of people, or
@@ -196,16 +196,16 @@ class Match:
         coverage : float, default=0.9
             Probability, above 0 and below 1.
         unit : {"frames", "percent", "seconds"}, default="frames"
-            Of the bounds, from the beginning of each performance, as in ``offsets_in``.
-        X : performances, or array-like of numbers, shape (n_sequences,), default=None
-            For seconds: the performances, or how many frames each has.
+            Of the bounds, from the beginning of each trial, as in ``offsets_in``.
+        X : trials, or array-like of numbers, shape (n_sequences,), default=None
+            For seconds: the trials, or how many frames each has.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             For seconds: frames per second of X, as in ``offsets_in``.
 
         Returns
         -------
         lower, upper : ndarray, shape (n_sequences, P)
-            Non-decreasing, inside the performance, and on both sides of ``times``. They meet at
+            Non-decreasing, inside the trial, and on both sides of ``times``. They meet at
             both ends, and at exact key-frames, which pin a warp.
 
         Raises
@@ -217,7 +217,7 @@ class Match:
         Notes
         -----
         It is computed when it, or ``doubtful``, is first asked for, in less time than the match
-        took. Until then the performances must not be changed in place.
+        took. Until then the trials must not be changed in place.
 
         Examples
         --------
@@ -237,39 +237,39 @@ class Match:
 
     @property
     def doubtful(self) -> np.ndarray:
-        """Which performances to look at before their warps are used, bool: (n_sequences,).
+        """Which trials to look at before their warps are used, bool: (n_sequences,).
 
         Those with much movement that no warp explains and a wide interval: cut off, repeated, or
-        another movement. And all performances if the training set did not support its warps.
+        another movement. And all trials if the training set did not support its warps.
         ``reasons`` says which. Raises as ``interval``.
         """
         return np.array([reason is not None for reason in self.reasons], dtype=bool)
 
     @property
     def reasons(self) -> list[str | None]:
-        """Why each performance is doubtful, in words; None if it is not."""
+        """Why each trial is doubtful, in words; None if it is not."""
         return list(self._known_intervals().measured().reasons)
 
     def offsets_in(
         self,
         unit: Unit,
-        X: PerformancesLike | ValuesLike | None = None,
+        X: TrialsLike | ValuesLike | None = None,
         frame_rate: float | ValuesLike | None = None,
         *,
         coverage: float | None = None,
     ) -> np.ndarray:
-        """How much later than the pattern performances are at every frame of it, in a unit of time.
+        """How much later than the pattern trials are at every frame of it, in a unit of time.
 
-        Offsets are relative to linear normalisation: all performances begin and end with the
+        Offsets are relative to linear normalisation: all trials begin and end with the
         pattern, and one that is uniformly slower is not late.
 
         Parameters
         ----------
         unit : {"frames", "percent", "seconds"}
             Frames of the pattern, as ``offsets``; per cent of the clock, ``100 Delta / (P - 1)``;
-            or seconds of each performance as recorded.
-        X : performances, or array-like of numbers, shape (n_sequences,), default=None
-            For seconds: the performances, or how many frames each has.
+            or seconds of each trial as recorded.
+        X : trials, or array-like of numbers, shape (n_sequences,), default=None
+            For seconds: the trials, or how many frames each has.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             For seconds: frames per second of X. By default what tables tell: an index in seconds,
             or ``attrs["frame_rate"]`` of `io.read_motion`.
@@ -279,7 +279,7 @@ class Match:
         Returns
         -------
         ndarray, shape (n_sequences, P), or (3, n_sequences, P)
-            Positive where a performance is later than the pattern. With a coverage the offsets, and
+            Positive where a trial is later than the pattern. With a coverage the offsets, and
             the lower and upper bounds of their intervals.
 
         Raises
@@ -298,25 +298,25 @@ class Match:
     def to_frame(
         self,
         unit: Unit = "frames",
-        X: PerformancesLike | ValuesLike | None = None,
+        X: TrialsLike | ValuesLike | None = None,
         frame_rate: float | ValuesLike | None = None,
         labels: Labels | None = None,
         *,
         coverage: float | None = None,
     ) -> pd.DataFrame:
-        """The timing of all performances as a table, such as for a CSV file.
+        """The timing of all trials as a table, such as for a CSV file.
 
         Parameters
         ----------
         unit : {"frames", "percent", "seconds"}, default="frames"
             Of ``time`` and ``offset``, as in ``offsets_in``.
-        X : performances, or array-like of numbers, shape (n_sequences,), default=None
+        X : trials, or array-like of numbers, shape (n_sequences,), default=None
             Needed for seconds. The labels of X are those of the table.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             For seconds: frames per second of X. By default what tables tell: an index in seconds,
             or ``attrs["frame_rate"]`` of `io.read_motion`.
         labels : sequence of length n_sequences, or Index, default=None
-            Labels of the performances; by default those of X, or 0, 1, ... A MultiIndex makes
+            Labels of the trials; by default those of X, or 0, 1, ... A MultiIndex makes
             several levels.
         coverage : float, default=None
             Probability of the intervals of ``interval``, such as 0.9. None for none.
@@ -324,8 +324,8 @@ class Match:
         Returns
         -------
         DataFrame
-            Indexed by the label of the performance and the frame of the pattern. Columns:
-            ``time``, tau(p) in the unit, from the beginning of each performance; ``offset``;
+            Indexed by the label of the trial and the frame of the pattern. Columns:
+            ``time``, tau(p) in the unit, from the beginning of each trial; ``offset``;
             ``rate``; and with a coverage ``lower`` and ``upper``, between which the time lies, and
             ``doubtful``.
 
@@ -333,7 +333,7 @@ class Match:
         ------
         ValueError
             As from ``offsets_in``, and with a coverage as from ``interval``; or if there is not one
-            label a performance.
+            label a trial.
 
         Examples
         --------
@@ -364,15 +364,15 @@ class Match:
         return table
 
     @classmethod
-    def from_estimator(cls, estimator: BaseEstimator, X: PerformancesLike, **params: Any) -> Self:
-        """Match raw performances by a fitted synchronizer, or by a pipeline with one.
+    def from_estimator(cls, estimator: BaseEstimator, X: TrialsLike, **params: Any) -> Self:
+        """Match raw trials by a fitted synchronizer, or by a pipeline with one.
 
         Parameters
         ----------
         estimator : synchronizer, or Pipeline with one
             Fitted.
         X : list of arrays (n_frames_i, n_features), or other collection
-            Performances, as the estimator takes them.
+            Trials, as the estimator takes them.
         **params : dict
             Metadata for the ``match`` of the synchronizer, such as ``keyframes``, and for the
             ``transform`` of the steps before it.
@@ -397,20 +397,20 @@ class Match:
         >>> bunch = make_bending(6, random_state=0)
         >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer(50))
         >>> Match.from_estimator(pipe.fit(bunch.data), bunch.data)
-        Match(6 performances on 50 frames)
+        Match(6 trials on 50 frames)
         """
         return route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator").match()
 
-    def warp(self, X: PerformancesLike) -> Transformed:
-        """Warp sequences recorded with the performances onto the clock of the pattern (Eq. 18).
+    def warp(self, X: TrialsLike) -> Transformed:
+        """Warp sequences recorded with the trials onto the clock of the pattern (Eq. 18).
 
         Such as joint positions when the match was made in the aSpace, forces, or muscle signals, at
-        any frame rate: the first and last frame of each are those of the performance.
+        any frame rate: the first and last frame of each are those of the trial.
 
         Parameters
         ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
-            One sequence a performance, in the same order. Samples interpolated from NaN or
+        X : list of arrays (n_frames_i, n_features), 3-D array, or (trial, frame) frame
+            One sequence a trial, in the same order. Samples interpolated from NaN or
             infinite values are such, too.
 
         Returns
@@ -421,21 +421,21 @@ class Match:
         Raises
         ------
         ValueError
-            If there is not one sequence a performance, or they break the contract for
-            performances.
+            If there is not one sequence a trial, or they break the contract for
+            trials.
         """
         arrays, _ = read_collection(X)
         self._check_count(arrays, "sequence")
         return sample(arrays, self.times, self.times.shape[1])
 
-    def frames(self, X: PerformancesLike | ValuesLike) -> np.ndarray:
-        """The frame of each performance that corresponds to each frame of the pattern.
+    def frames(self, X: TrialsLike | ValuesLike) -> np.ndarray:
+        """The frame of each trial that corresponds to each frame of the pattern.
 
         Parameters
         ----------
-        X : performances, or array-like of numbers, shape (n_sequences,)
-            The performances, sequences recorded with them, or how many frames each has. For
-            univariate performances in rows give ``[X.shape[1]] * len(X)``.
+        X : trials, or array-like of numbers, shape (n_sequences,)
+            The trials, sequences recorded with them, or how many frames each has. For
+            univariate trials in rows give ``[X.shape[1]] * len(X)``.
 
         Returns
         -------
@@ -445,35 +445,35 @@ class Match:
         Raises
         ------
         ValueError
-            If there is not one a performance, or one has fewer than two frames.
+            If there is not one a trial, or one has fewer than two frames.
         """
         return self._stretched(self.times, X)
 
     def seconds(
         self,
-        X: PerformancesLike | ValuesLike,
+        X: TrialsLike | ValuesLike,
         frame_rate: float | ValuesLike | None = None,
     ) -> np.ndarray:
-        """The time in each performance that corresponds to each frame of the pattern.
+        """The time in each trial that corresponds to each frame of the pattern.
 
         Parameters
         ----------
-        X : performances, or array-like of numbers, shape (n_sequences,)
-            The performances, or how many frames each has, as for ``frames``.
+        X : trials, or array-like of numbers, shape (n_sequences,)
+            The trials, or how many frames each has, as for ``frames``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames per second of X; one for each performance if they differ. By default what tables
+            Frames per second of X; one for each trial if they differ. By default what tables
             tell, as in ``to_frame``.
 
         Returns
         -------
         ndarray, shape (n_sequences, P)
-            Seconds from the first frame of each performance.
+            Seconds from the first frame of each trial.
 
         Raises
         ------
         ValueError
             As from ``frames``; or if a rate is not above 0 or not known, or there is not one a
-            performance.
+            trial.
         """
         return self._in_seconds(self.times, X, frame_rate)
 
@@ -490,7 +490,7 @@ class Match:
         if check_unit(unit) == "seconds":
             if X is None:
                 raise ValueError(
-                    "unit='seconds' needs X, the performances or how many frames each has, and "
+                    "unit='seconds' needs X, the trials or how many frames each has, and "
                     "frame_rate."
                 )
             return self._in_seconds(frames, X, frame_rate)
@@ -500,14 +500,14 @@ class Match:
         return frames * (100 / (self.times.shape[1] - 1) if unit == "percent" else 1)
 
     def _stretched(self, times, X):
-        """Frames of the pattern in frames of each performance."""
+        """Frames of the pattern in frames of each trial."""
         lengths = _lengths(X)
         self._check_count(lengths, "length")
         sound = (lengths >= 2) & (lengths == np.floor(lengths))
         if not sound.all():
             i = int(np.argmin(sound))
             raise ValueError(
-                f"Performance {i} has {counted(lengths[i], 'frame')}; give the performances, or "
+                f"Trial {i} has {counted(lengths[i], 'frame')}; give the trials, or "
                 "how many frames each has, whole numbers of at least 2."
             )
         return times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
@@ -527,10 +527,10 @@ class Match:
 
     def __repr__(self):
         n_sequences, n_frames = self.times.shape
-        return f"Match({counted(n_sequences, 'performance')} on {n_frames} frames)"
+        return f"Match({counted(n_sequences, 'trial')} on {n_frames} frames)"
 
     def _repr_html_(self):
-        """A table for notebooks: how late each of the first performances is, and when."""
+        """A table for notebooks: how late each of the first trials is, and when."""
         percent = 100 * self.offsets / (self.times.shape[1] - 1)
         largest = max(np.abs(percent).max(initial=0), 1e-9)
         rows = []
@@ -542,7 +542,7 @@ class Match:
                 f"<tr><td>{i}</td><td>{when}</td><td>{_sparkline(offsets, largest)}</td></tr>"
             )
         more = len(percent) - len(rows)
-        tail = f"<p>and {counted(more, 'performance')} more</p>" if more else ""
+        tail = f"<p>and {counted(more, 'trial')} more</p>" if more else ""
         return (
             f"<p>{html.escape(repr(self))}; offsets of at most {largest:.1f} % of the pattern</p>"
             "<table><thead><tr><th></th><th>largest offset</th><th>offset, late is up</th></tr>"
@@ -552,7 +552,7 @@ class Match:
     def _check_count(self, given, noun):
         if len(given) != len(self.times):
             raise ValueError(
-                f"{counted(len(self.times), 'matched performance')}, but "
+                f"{counted(len(self.times), 'matched trial')}, but "
                 f"{counted(len(given), noun)}: give one for each, in the same order."
             )
 
@@ -580,17 +580,17 @@ def check_coverage(coverage):
 
 
 def match_of_times(times, n_sequences) -> Match:
-    """A match without distances, of given warps of so many performances."""
+    """A match without distances, of given warps of so many trials."""
     if np.ndim(times) > 0 and len(times) != n_sequences:
         raise ValueError(
             f"times must have shape (n_sequences, P), one row for each of the {n_sequences} "
-            f"performances; got {np.shape(times)}."
+            f"trials; got {np.shape(times)}."
         )
     return Match(times)
 
 
 def check_match(match, n_sequences, n_frames, name):
-    """Refuse the match of a synchronizer of this name unless it has all performances."""
+    """Refuse the match of a synchronizer of this name unless it has all trials."""
     shape = np.shape(getattr(match, "times", None))
     if shape != (n_sequences, n_frames):
         raise ValueError(
@@ -607,13 +607,13 @@ def check_unit(unit):
 
 
 def timing_table(columns, X, labels):
-    """A table indexed by performance and frame of the pattern.
+    """A table indexed by trial and frame of the pattern.
 
     Parameters
     ----------
     columns : dict of ndarray, shape (n_sequences, P)
         By name.
-    X : performances, how many frames each has, or None
+    X : trials, how many frames each has, or None
         Its labels are those of the table if there are no ``labels``.
     labels : sequence of length n_sequences, Index, or None
 
@@ -625,11 +625,11 @@ def timing_table(columns, X, labels):
         pd.DataFrame(np.column_stack(of_one), columns=list(columns))
         for of_one in zip(*columns.values(), strict=True)
     ]
-    return to_frame(tables, performances=_labels_of(X) if labels is None else labels)
+    return to_frame(tables, trials=_labels_of(X) if labels is None else labels)
 
 
 def rates_of(X, frame_rate=None, unit="seconds"):
-    """The frame rates of performances: as given, or for seconds as tables tell them.
+    """The frame rates of trials: as given, or for seconds as tables tell them.
 
     Returns
     -------
@@ -644,16 +644,16 @@ def rates_of(X, frame_rate=None, unit="seconds"):
 
 
 def _are_lengths(X):
-    """Whether X holds how many frames performances have, instead of the performances."""
+    """Whether X holds how many frames trials have, instead of the trials."""
     is_plain = hasattr(X, "__len__") and not isinstance(X, Mapping) and not hasattr(X, "columns")
     return is_plain and all(np.ndim(n) == 0 for n in X)
 
 
 def _lengths(X):
-    """How many frames the performances have, of performances or of such numbers."""
+    """How many frames the trials have, of trials or of such numbers."""
     if getattr(X, "ndim", 0) == 2 and not hasattr(X, "columns"):
         raise ValueError(
-            "X is a single 2-D input. Wrap one performance as [X]; for univariate ones in rows "
+            "X is a single 2-D input. Wrap one trial as [X]; for univariate ones in rows "
             "give how many frames each has, [X.shape[1]] * len(X)."
         )
     if _are_lengths(X):
@@ -662,7 +662,7 @@ def _lengths(X):
 
 
 def _labels_of(X):
-    """Labels of performances, or tables that have them; None without any."""
+    """Labels of trials, or tables that have them; None without any."""
     if isinstance(X, pd.Series):
         is_numbered = isinstance(X.index, pd.RangeIndex) or not X.index.is_unique
         return None if is_numbered else X.index

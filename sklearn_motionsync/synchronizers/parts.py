@@ -14,14 +14,14 @@ from scipy.stats import t as student
 from sklearn.base import clone
 from sklearn.utils._param_validation import Interval
 
-from ..body.limbs import parts_of_names, parts_of_postures
+from ..body.limbs import parts_of_names, parts_of_poses
 from ..inputs.features import choose_features
 from ..inputs.types import (
     Features,
     Indexed,
     Labels,
-    PerformancesLike,
     SupportsArray,
+    TrialsLike,
     Unit,
     ValuesLike,
 )
@@ -68,7 +68,7 @@ class PartSynchronizer(AnchoredSynchronizer):
     """Synchronise parts of the body, each by a warp of its own, coupled to the body's warp.
 
     A single warp for the whole body cannot show that an arm is late while the legs are not: the
-    delay stays in the synchronised postures. Here every part has its own warp, and ``lags`` reports
+    delay stays in the synchronised poses. Here every part has its own warp, and ``lags`` reports
     how much later each part is than it usually is, and than the others are.
 
     1. A `DenseSynchronizer` matches the whole body to the pattern: tau_body.
@@ -77,7 +77,7 @@ class PartSynchronizer(AnchoredSynchronizer):
 
            lambda (d - d_body)^2
 
-       where d_body is the body's offset between the same two performances, and lambda is
+       where d_body is the body's offset between the same two trials, and lambda is
        ``coupling`` times the mean squared norm of the part's features, with d in per cent of the
        clock.
     3. ``transform`` samples every part at its own times. Features that belong to no part follow the
@@ -88,7 +88,7 @@ class PartSynchronizer(AnchoredSynchronizer):
     parts : dict of str to features, default=None
         The features of each part, by name or index. No feature may be in two parts. By default both
         arms, both legs and the trunk, if the features are direction cosines: recognised by their
-        names, or as whole postures without names. For other features the default is no parts, and
+        names, or as whole poses without names. For other features the default is no parts, and
         all of them follow the body. ``Skeleton.parts()`` gives the parts of an incomplete body.
         For joint positions, name the columns of each part.
     coupling : float, default=0.001
@@ -133,7 +133,7 @@ class PartSynchronizer(AnchoredSynchronizer):
 
     A part that hardly moves, such as the idle arm of a grab, carries no information about timing:
     without coupling its warp and its lag are random. `Lags.summary` shows this as a large spread.
-    The coupling reduces the mean distance of a part from the body; a single performance may still
+    The coupling reduces the mean distance of a part from the body; a single trial may still
     jump.
 
     References
@@ -196,23 +196,23 @@ class PartSynchronizer(AnchoredSynchronizer):
             _apart=apart,
         )
 
-    def _match(self, performances, keyframes=None, frame_rate=None):
-        return self.synchronizer_.match(performances, keyframes, frame_rate)
+    def _match(self, trials, keyframes=None, frame_rate=None):
+        return self.synchronizer_.match(trials, keyframes, frame_rate)
 
     def match_parts(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
     ) -> dict[str, Match]:
-        """Match every part of performances to that of the pattern.
+        """Match every part of trials to that of the pattern.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each performance, as for ``fit``.
+            Key-frames of each trial, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
 
@@ -222,13 +222,13 @@ class PartSynchronizer(AnchoredSynchronizer):
             By part. ``distances`` are those of the part's own features, without the coupling; NaN
             for parts that only follow the body.
         """
-        performances = self.check_performances(X)
-        body = self.match(performances, **self._given(X, keyframes, frame_rate))
-        return self._match_parts(performances, body, self.parts_)
+        trials = self.check_trials(X)
+        body = self.match(trials, **self._given(X, keyframes, frame_rate))
+        return self._match_parts(trials, body, self.parts_)
 
     def lags(
         self,
-        X: PerformancesLike,
+        X: TrialsLike,
         groups: Labels | None = None,
         *,
         unit: Unit = "frames",
@@ -236,11 +236,11 @@ class PartSynchronizer(AnchoredSynchronizer):
     ) -> Lags:
         """How much later than the rest of the body each part is, at every frame of the pattern.
 
-        Offsets of every part are counted from their mean over training performances: where people
+        Offsets of every part are counted from their mean over training trials: where people
         move an arm late, an arm that is as late has no lag. The rest of the body is late by what
         the other parts that move have in common, features of no part among them. So one part that
         is late, or two, leave the lags of the others as they are. How many parts must agree is
-        learnt: all of them where parts of the training performances differ as much as they share, a
+        learnt: all of them where parts of the training trials differ as much as they share, a
         majority where they move together.
         Coupling would draw late parts back, and others along: lags are those of parts that are
         matched without it, unlike those of `match_parts`. An infinite coupling leaves none.
@@ -248,9 +248,9 @@ class PartSynchronizer(AnchoredSynchronizer):
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         groups : array-like of shape (n_sequences,), default=None
-            The subject of each performance: then the report separates the spread within and
+            The subject of each trial: then the report separates the spread within and
             between subjects.
         unit : {"frames", "percent", "seconds"}, default="frames"
             Unit of the lags, as in ``Match.offsets_in``.
@@ -261,14 +261,14 @@ class PartSynchronizer(AnchoredSynchronizer):
         Returns
         -------
         Lags
-            One curve a performance and part.
+            One curve a trial and part.
 
         Raises
         ------
         ValueError
-            If there are no parts, or not one group a performance.
+            If there are no parts, or not one group a trial.
         """
-        performances = self.check_performances(X)
+        trials = self.check_trials(X)
         if not self.parts_:
             raise ValueError(
                 "There are no parts: they are not given, and the features are not recognised as "
@@ -276,11 +276,11 @@ class PartSynchronizer(AnchoredSynchronizer):
             )
         people = None
         if groups is not None:
-            groups, people = encode_groups(groups, len(performances))
+            groups, people = encode_groups(groups, len(trials))
         # Free of coupling, no part is drawn to the body, and its warp is not needed.
-        even = np.tile(np.arange(self.n_frames_, dtype=np.float64), (len(performances), 1))
-        matches = self._match_parts(performances, Match(even), self._warpers, free=True)
-        lengths, rates = [len(x) for x in performances], rates_of(X, frame_rate, unit)
+        even = np.tile(np.arange(self.n_frames_, dtype=np.float64), (len(trials), 1))
+        matches = self._match_parts(trials, Match(even), self._warpers, free=True)
+        lengths, rates = [len(x) for x in trials], rates_of(X, frame_rate, unit)
         offsets = {}
         for name, match in matches.items():
             usual = Match(np.broadcast_to(self._usual[name], match.times.shape))
@@ -295,24 +295,24 @@ class PartSynchronizer(AnchoredSynchronizer):
             for name in self.parts_
         ]
         values = np.stack(lags, axis=1)
-        return Lags(values, [*self.parts_], unit, groups, people, performances.labels)
+        return Lags(values, [*self.parts_], unit, groups, people, trials.labels)
 
-    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        performances = with_confidence(performances, confidence)
-        body = self.match(performances, keyframes, frame_rate)
-        out = body.warp(performances)
-        for name, match in self._match_parts(performances, body, self.parts_).items():
+    def _warp_part(self, trials, keyframes=None, frame_rate=None, confidence=None):
+        trials = with_confidence(trials, confidence)
+        body = self.match(trials, keyframes, frame_rate)
+        out = body.warp(trials)
+        for name, match in self._match_parts(trials, body, self.parts_).items():
             columns = self.parts_[name]
-            out[:, :, columns] = match.warp([x[:, columns] for x in performances])
+            out[:, :, columns] = match.warp([x[:, columns] for x in trials])
         return out
 
-    def _match_parts(self, performances, body, names, free=False):
+    def _match_parts(self, trials, body, names, free=False):
         """Matches of parts by their names, perhaps free of the coupling to the body.
 
         What does not move has the warp of the body.
         """
         matches, sync = {}, self.synchronizer_
-        performances = self._without_gaps(performances)
+        trials = self._without_gaps(trials)
         for name in names:
             warper = self._warpers[name]
             if warper is None:
@@ -320,7 +320,7 @@ class PartSynchronizer(AnchoredSynchronizer):
                 continue
             distances, times = warp_in_portions(
                 replace(warper, weight=0.0) if free else warper,
-                performances,
+                trials,
                 body.times,
                 n_jobs=sync.n_jobs,
                 begin=lambda fits: Progress(self, sync.verbose),
@@ -409,21 +409,21 @@ def learn_parts(self, training, parts, coupling, progress):
     return warpers, mean, share
 
 
-def choose_parts(parts, performances, names):
+def choose_parts(parts, trials, names):
     """Indices of the features of every part, by its name.
 
     Parameters
     ----------
     parts : mapping of str to features, or None
-        Given by the user; None to recognise them by their names or as postures.
-    performances : Performances
+        Given by the user; None to recognise them by their names or as poses.
+    trials : Trials
     names : sequence or None
         Of their features.
     """
     if parts is None:
-        recognised = parts_of_postures(performances) if names is None else parts_of_names(names)
+        recognised = parts_of_poses(trials) if names is None else parts_of_names(names)
         return {name: np.array(features) for name, features in recognised.items()}
-    names = [f"x{i}" for i in range(performances[0].shape[1])] if names is None else [*names]
+    names = [f"x{i}" for i in range(trials[0].shape[1])] if names is None else [*names]
     chosen, owner = {}, {}
     for part, features in parts.items():
         if not isinstance(part, str) or part == _REST:
@@ -459,8 +459,8 @@ class Lags(NamedTuple):
     """How much later than the rest of the body each part is, at every frame of the pattern.
 
     `PartSynchronizer.lags` returns them. Lags are counted from the mean of the training
-    performances. Their spread shows whether a lag is a habit of subjects or varies from performance
-    to performance.
+    trials. Their spread shows whether a lag is a habit of subjects or varies from trial
+    to trial.
 
     Parameters
     ----------
@@ -471,15 +471,15 @@ class Lags(NamedTuple):
     unit : {"frames", "percent", "seconds"}
         Unit of the values.
     groups : ndarray of int, shape (n_sequences,), default=None
-        The subject of every performance, counted from 0.
+        The subject of every trial, counted from 0.
     people : list, default=None
         Labels of the subjects.
     labels : list, default=None
-        Labels of the performances.
+        Labels of the trials.
 
     Examples
     --------
-    Two subjects, two performances each. The arm of the second is always late by 4 frames.
+    Two subjects, two trials each. The arm of the second is always late by 4 frames.
 
     >>> import numpy as np
     >>> from sklearn_motionsync import Lags
@@ -505,17 +505,17 @@ class Lags(NamedTuple):
     labels: list | None = None
 
     def summary(self) -> pd.DataFrame:
-        """The mean lag of a performance over the clock, and its spread, part by part.
+        """The mean lag of a trial over the clock, and its spread, part by part.
 
         Returns
         -------
         DataFrame
-            A row a part. ``mean`` over performances, or with groups over the means of subjects;
-            ``sd`` over performances; ``low`` and ``high``, the 95 % confidence interval of the
-            mean, by the t distribution over subjects, or over performances without groups. With
+            A row a part. ``mean`` over trials, or with groups over the means of subjects;
+            ``sd`` over trials; ``low`` and ``high``, the 95 % confidence interval of the
+            mean, by the t distribution over subjects, or over trials without groups. With
             groups also a one-way analysis of variance: ``sd_within`` and ``sd_between`` subjects,
             and ``icc``, the share of the variance between subjects, ICC(1,1): near 1 for a habit,
-            near 0 for a lag that varies. NaN where there are too few performances or subjects.
+            near 0 for a lag that varies. NaN where there are too few trials or subjects.
         """
         columns = self._spread(self.values.mean(axis=2))
         return pd.DataFrame(columns, index=pd.Index(self.parts, name="part"))
@@ -540,7 +540,7 @@ class Lags(NamedTuple):
         Returns
         -------
         DataFrame
-            A row a performance and frame of the pattern, a column a part.
+            A row a trial and frame of the pattern, a column a part.
         """
         columns = {part: self.values[:, i] for i, part in enumerate(self.parts)}
         return timing_table(columns, None, self.labels)
@@ -548,7 +548,7 @@ class Lags(NamedTuple):
     def __repr__(self):
         n_sequences, n_parts, n_frames = self.values.shape
         return (
-            f"Lags({counted(n_parts, 'part')} of {counted(n_sequences, 'performance')} on "
+            f"Lags({counted(n_parts, 'part')} of {counted(n_sequences, 'trial')} on "
             f"{n_frames} frames, in {self.unit})"
         )
 
@@ -627,7 +627,7 @@ def _interval(mean, sd, n):
 def _components(values, own, groups, counts):
     """Variances within and between groups of unequal counts, by a one-way analysis of variance.
 
-    NaN if no group has two performances, or there is only one group.
+    NaN if no group has two trials, or there is only one group.
     """
     n_groups, n = len(counts), len(values)
     within = between = np.full(values.shape[1], np.nan)

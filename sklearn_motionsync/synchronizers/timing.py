@@ -1,4 +1,4 @@
-"""TimingChannel: synchronised performances with their timing as an additional feature."""
+"""TimingChannel: synchronised trials with their timing as an additional feature."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sklearn.utils.metadata_routing import (
 )
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.types import NamesLike, PerformancesLike, Transformed, Unit
+from ..inputs.types import NamesLike, Transformed, TrialsLike, Unit
 from ..inputs.validation import restore
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
@@ -39,10 +39,10 @@ _TELLING = (DenseSynchronizer, PartSynchronizer)
 class TimingChannel(
     DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator
 ):
-    """Synchronised performances, with their timing as an additional feature.
+    """Synchronised trials, with their timing as an additional feature.
 
     Synchronisation removes differences in timing from the curves. Here they are appended to the
-    curves, as how much later than the pattern a performance is (`Match.offsets_in`). So later
+    curves, as how much later than the pattern a trial is (`Match.offsets_in`). So later
     steps, such as principal components, a test along the clock, or a classifier, use both shape and
     timing.
 
@@ -52,9 +52,9 @@ class TimingChannel(
         Such as ``DenseSynchronizer()``; a clone of it is fitted.
     unit : {"percent", "frames", "seconds"}, default="percent"
         Unit of the offset: per cent of the clock, frames of the pattern, or seconds of each
-        performance.
+        trial.
     frame_rate : float, default=None
-        Frames per second of the performances, for seconds only.
+        Frames per second of the trials, for seconds only.
     errors : bool, default=False
         Whether to append, after the offset, its standard error in its unit: half of the interval
         that `Match.interval` gives for a coverage of 68.27 %. For a `DenseSynchronizer` or
@@ -83,7 +83,7 @@ class TimingChannel(
 
     Errors are 0 at both ends and at exact key-frames, where a warp is pinned, and nearly 0 for the
     pattern itself. A weight of ``1 / error ** 2`` is then infinite. Add a variance to the square of
-    the error: that of the true offsets of the performances, or that of what is read off a frame.
+    the error: that of the true offsets of the trials, or that of what is read off a frame.
 
     Metadata of the synchronizer, such as ``keyframes``, are arguments of ``fit`` and ``transform``;
     with scikit-learn's metadata routing they are requested by ``set_fit_request`` and
@@ -91,7 +91,7 @@ class TimingChannel(
 
     Examples
     --------
-    The second performance reaches its peak at 60 % instead of 50 % of the time.
+    The second trial reaches its peak at 60 % instead of 50 % of the time.
 
     >>> import numpy as np
     >>> from sklearn_motionsync import DenseSynchronizer, TimingChannel
@@ -104,7 +104,7 @@ class TimingChannel(
     >>> channel.transform(X)[1, 50].round().tolist()  # the peak, and how late it is: 10 in truth
     [1.0, 9.0]
 
-    A mean offset in which performances under noise count less: their offsets are less sure.
+    A mean offset in which trials under noise count less: their offsets are less sure.
 
     >>> rng = np.random.default_rng(0)
     >>> noise = np.repeat([0.02, 0.5], 4)[:, np.newaxis, np.newaxis]
@@ -137,13 +137,13 @@ class TimingChannel(
         self.errors = errors
 
     @validated_with_nested
-    def fit(self, X: PerformancesLike, y: object = None, **params: Any) -> Self:
+    def fit(self, X: TrialsLike, y: object = None, **params: Any) -> Self:
         """Fit a clone of the synchronizer.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : ignored
             Passed to the ``fit`` of the synchronizer.
         **params : dict
@@ -191,13 +191,13 @@ class TimingChannel(
         """Names of the features; only if the input had names."""
         return self.synchronizer_.feature_names_in_
 
-    def fit_transform(self, X: PerformancesLike, y: object = None, **params: Any) -> Transformed:
-        """Fit, and transform the same performances.
+    def fit_transform(self, X: TrialsLike, y: object = None, **params: Any) -> Transformed:
+        """Fit, and transform the same trials.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         y : ignored
             Passed to the ``fit`` of the synchronizer.
         **params : dict
@@ -216,13 +216,13 @@ class TimingChannel(
         to_fit = {name: params[name] for name in params if name in fits or name not in warps}
         return self.fit(X, y, **to_fit).transform(X, **{name: params[name] for name in warps})
 
-    def transform(self, X: PerformancesLike, **params: Any) -> Transformed:
-        """Warp performances onto the clock of the pattern, and append the offset.
+    def transform(self, X: TrialsLike, **params: Any) -> Transformed:
+        """Warp trials onto the clock of the pattern, and append the offset.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         **params : dict
             Metadata for the ``match`` of the synchronizer, such as ``keyframes``.
 
@@ -231,32 +231,32 @@ class TimingChannel(
         ndarray, shape (n_sequences, P, n_features + 1)
             The offset is the last feature; with errors they follow as one more. For 2-D input
             ``(n_sequences, 2 P)``: each row is a curve, then its offset, then its errors. A
-            ``(performance, frame)`` frame under ``set_output(transform="pandas")``.
+            ``(trial, frame)`` frame under ``set_output(transform="pandas")``.
         """
         check_is_fitted(self)
         sync, params = self.synchronizer_, self._route("transform", params)
-        performances = sync.check_performances(X)
-        match = sync.match(performances, **params)
-        check_match(match, len(performances), self.n_frames_, type(sync).__name__)
-        curves = match.warp(performances)
-        lengths = [len(x) for x in performances]
+        trials = sync.check_trials(X)
+        match = sync.match(trials, **params)
+        check_match(match, len(trials), self.n_frames_, type(sync).__name__)
+        curves = match.warp(trials)
+        lengths = [len(x) for x in trials]
         timing = [match.offsets_in(self.unit, lengths, self.frame_rate)]
         if self.errors:
             lower, upper = match.interval(STANDARD, self.unit, lengths, self.frame_rate)
             timing.append((upper - lower) / 2)
         timing = [feature.astype(curves.dtype) for feature in timing]
-        if performances.kind == "rows":
+        if trials.kind == "rows":
             return np.concatenate([curves[:, :, 0], *timing], axis=1)
         out = np.concatenate([curves, np.stack(timing, axis=2)], axis=2)
-        return restore(self, performances, out, frames=range(self.n_frames_))
+        return restore(self, trials, out, frames=range(self.n_frames_))
 
-    def match(self, X: PerformancesLike, **params: Any) -> Match:
-        """Match performances to the pattern, as the synchronizer does.
+    def match(self, X: TrialsLike, **params: Any) -> Match:
+        """Match trials to the pattern, as the synchronizer does.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
+            Trials; the rows of a 2-D array are univariate ones.
         **params : dict
             Metadata for the ``match`` of the synchronizer, such as ``keyframes``.
 

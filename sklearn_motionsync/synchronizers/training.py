@@ -9,7 +9,7 @@ import pandas as pd
 from sklearn.utils import check_random_state
 
 from ..inputs.collections import (
-    Performances,
+    Trials,
     as_collection,
     as_source,
     count_of,
@@ -33,7 +33,7 @@ __all__ = [
     "check_fill",
     "check_pattern",
     "draw_sample",
-    "fill_performances",
+    "fill_trials",
     "fill_warped",
     "hold_gaps",
     "known_whole",
@@ -55,7 +55,7 @@ class TrainingSet(NamedTuple):
 
     Attributes
     ----------
-    trials : Performances
+    trials : Trials
         Without gaps.
     filler : Filler or None
         What filled their gaps.
@@ -65,7 +65,7 @@ class TrainingSet(NamedTuple):
         Known key-frames as shares of the trials; NaN for those that are not known.
     """
 
-    trials: Performances
+    trials: Trials
     filler: Filler | None
     population: int
     keyframes: np.ndarray | None = None
@@ -184,7 +184,7 @@ def put_on_clock(training, n_frames, pattern, advice, keyframe_std=0.0):
     n_bytes = 8 * n_trials * n_frames * n_features
     if n_bytes > MOST_BYTES:
         raise ValueError(
-            f"{counted(n_trials, 'performance')} at n_frames = {n_frames} take "
+            f"{counted(n_trials, 'trial')} at n_frames = {n_frames} take "
             f"{n_bytes / 2**30:.0f} GB several times over; {MOST_BYTES / 2**30:.0f} GB is the "
             f"limit. Use {advice}."
         )
@@ -250,7 +250,7 @@ def check_pattern(pattern, trials, names):
     Parameters
     ----------
     pattern : as of a synchronizer
-    trials : Performances
+    trials : Trials
     names : sequence or None
         Of the features.
     """
@@ -262,7 +262,7 @@ def check_pattern(pattern, trials, names):
         if pattern not in trials.numbers:
             raise ValueError(
                 f"pattern={pattern} is out of range: there are {len(trials)} "
-                f"performances, the last has index {len(trials) - 1}."
+                f"trials, the last has index {len(trials) - 1}."
             )
         return int(pattern)
     check_names(pattern, names, "The pattern")
@@ -272,7 +272,7 @@ def check_pattern(pattern, trials, names):
     if array.ndim != 2 or len(array) < 2 or array.shape[1] != width:
         raise ValueError(
             f"A pattern given as an array must have shape (n_frames, {width}) with at least 2 "
-            f"frames, like the performances; got {array.shape}."
+            f"frames, like the trials; got {array.shape}."
         )
     check_finite(array, "The pattern, frame", names)
     check_magnitude(float(np.abs(array).max()), "The pattern", training=True)
@@ -339,18 +339,18 @@ def _are_principal_components(trials):
 _SURE = 0.5
 
 
-def hold_gaps(performances):
-    """Whether anything of performances is NaN, or not sure; they hold no infinity."""
-    sums = [x.sum() for x in performances]
-    return performances.confidence is not None or bool(np.isnan(sums).any())
+def hold_gaps(trials):
+    """Whether anything of trials is NaN, or not sure; they hold no infinity."""
+    sums = [x.sum() for x in trials]
+    return trials.confidence is not None or bool(np.isnan(sums).any())
 
 
-def with_confidence(performances, confidence):
-    """Performances of which what is less sure than not is hidden.
+def with_confidence(trials, confidence):
+    """Trials of which what is less sure than not is hidden.
 
     Parameters
     ----------
-    performances : Performances
+    trials : Trials
     confidence : list of array-like (n_frames_i,) or (n_frames_i, n_features), or None
         From 0 to 1, one for each of all that were given.
 
@@ -360,44 +360,44 @@ def with_confidence(performances, confidence):
         If there is not one for each, of these shapes and in this range.
     """
     if confidence is None:
-        return performances
-    n = len(performances)
+        return trials
+    n = len(trials)
     # Some of all that were given have the confidence of their number.
-    is_whole = list(performances.numbers) == list(range(n))
+    is_whole = list(trials.numbers) == list(range(n))
     count = len(confidence) if hasattr(confidence, "__len__") else -1
-    if count <= max(performances.numbers) or (is_whole and count != n):
+    if count <= max(trials.numbers) or (is_whole and count != n):
         raise ValueError(
             f"confidence must be a list of {n} arrays, (n_frames,) or (n_frames, n_features), one "
-            f"a performance; got {confidence!r:.200}."
+            f"a trial; got {confidence!r:.200}."
         )
     arrays, confidences = [], []
-    for i, x in zip(performances.numbers, performances, strict=True):
-        sure = as_numbers(confidence[i], f"Performance {i}: confidence", dtype=np.float64)
+    for i, x in zip(trials.numbers, trials, strict=True):
+        sure = as_numbers(confidence[i], f"Trial {i}: confidence", dtype=np.float64)
         if sure.shape not in (x.shape, x.shape[:1]):
             raise ValueError(
-                f"Performance {i}: confidence has shape {sure.shape}, expected one number a frame, "
+                f"Trial {i}: confidence has shape {sure.shape}, expected one number a frame, "
                 f"{x.shape[:1]}, or one for each feature, {x.shape}."
             )
         sure = np.broadcast_to(sure.reshape(len(x), -1), x.shape)
         # Not a number fails the comparison, too.
         if not (sure.min() >= 0 and sure.max() <= 1):
             raise ValueError(
-                f"Performance {i}: confidence must be from 0, not seen, to 1, got "
+                f"Trial {i}: confidence must be from 0, not seen, to 1, got "
                 f"{sure.min():g} to {sure.max():g}. Divide it by its largest value."
             )
         arrays.append(np.where(sure < _SURE, x.dtype.type(np.nan), x))
         confidences.append(sure)
-    out = performances.replace(arrays)
+    out = trials.replace(arrays)
     out.confidence = confidences
     return out
 
 
-def learn_filler(performances, names=None):
+def learn_filler(trials, names=None):
     """The filler of a training set.
 
     Parameters
     ----------
-    performances : sequence of ndarray (n_frames_i, n_features)
+    trials : sequence of ndarray (n_frames_i, n_features)
     names : sequence, default=None
         Of the features.
 
@@ -406,66 +406,66 @@ def learn_filler(performances, names=None):
     ValueError
         If a feature is NaN in all of them.
     """
-    never = np.logical_and.reduce([np.isnan(x).all(axis=0) for x in performances])
+    never = np.logical_and.reduce([np.isnan(x).all(axis=0) for x in trials])
     if never.any():
         k = int(never.argmax())
         name = k if names is None else f"{k} ({names[k]!r})"
         raise ValueError(
-            f"Feature {name} is NaN in every frame of every performance; never seen: "
+            f"Feature {name} is NaN in every frame of every trial; never seen: "
             f"{never.sum()} of {counted(len(never), 'feature')}. Leave such out, or add a "
-            "performance that shows them."
+            "trial that shows them."
         )
-    return Filler.learn(performances)
+    return Filler.learn(trials)
 
 
-def fill_performances(filler, performances):
-    """Performances without gaps, and with the weights of their frames.
+def fill_trials(filler, trials):
+    """Trials without gaps, and with the weights of their frames.
 
     Parameters
     ----------
     filler : Filler
-    performances : Performances
+    trials : Trials
 
     Raises
     ------
     ValueError
-        If all of a performance is NaN, or the end of one in an array of equal lengths.
+        If all of a trial is NaN, or the end of one in an array of equal lengths.
     """
     filled = []
-    if performances.kind == "array":
-        _refuse_padding(performances)
-    for i, x in enumerate(performances):
-        sure = 1.0 if performances.confidence is None else performances.confidence[i]
+    if trials.kind == "array":
+        _refuse_padding(trials)
+    for i, x in enumerate(trials):
+        sure = 1.0 if trials.confidence is None else trials.confidence[i]
         if not is_gappy(x) and np.all(sure == 1):
             filled.append((x, np.ones(len(x))))
             continue
         if np.isnan(x).all():
             raise ValueError(
-                f"{performances.called(i)} is NaN in every frame and feature: nothing of it was "
+                f"{trials.called(i)} is NaN in every frame and feature: nothing of it was "
                 "seen, so it has no timing. Leave it out."
             )
         filled.append(filler(x, sure))
     arrays, weights = zip(*filled, strict=True)
-    out = performances.replace(arrays)
+    out = trials.replace(arrays)
     out.weights = list(weights)
     return out
 
 
-def _refuse_padding(performances):
-    """Refuse frames of NaN that only bring performances to the length of the longest."""
-    for i, x in enumerate(performances):
+def _refuse_padding(trials):
+    """Refuse frames of NaN that only bring trials to the length of the longest."""
+    for i, x in enumerate(trials):
         if not np.isnan(x).all() and np.isnan(x[-1]).all():
             n = len(x) - int(np.argmin(np.isnan(x[::-1]).all(axis=1)))
             raise ValueError(
-                f"{performances.called(i)} is NaN from frame {n} to its end, frame {len(x) - 1}: "
+                f"{trials.called(i)} is NaN from frame {n} to its end, frame {len(x) - 1}: "
                 "in an array of equal lengths such frames only fill up. Give a list without them, "
                 f"such as [X[0], X[1][:{n}], ...]; if the end was not seen, give list(X)."
             )
 
 
-def known_whole(performances, but):
-    """Indices of filled performances that had no gaps, but for one."""
-    weights = performances.weights or [np.ones(1)] * len(performances)
+def known_whole(trials, but):
+    """Indices of filled trials that had no gaps, but for one."""
+    weights = trials.weights or [np.ones(1)] * len(trials)
     return np.array([i for i, w in enumerate(weights) if i != but and w.min() == 1], np.intp)
 
 
@@ -479,9 +479,9 @@ def check_fill(fill):
 
 
 def fill_warped(warped, examples):
-    """Fill warped performances from the mean of others at every moment, in place.
+    """Fill warped trials from the mean of others at every moment, in place.
 
-    A performance deviates from the mean. Its deviations are filled as gaps are before a match.
+    A trial deviates from the mean. Its deviations are filled as gaps are before a match.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Transformers of postures, frame by frame."""
+"""Transformers of poses, frame by frame."""

@@ -1,4 +1,4 @@
-"""aSpace: the principal components of the postures of an action (Eqs. 3-5)."""
+"""aSpace: the principal components of the poses of an action (Eqs. 3-5)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from sklearn.utils.extmath import svd_flip
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
-from ..inputs.types import NamesLike, PerformancesLike, Transformed
+from ..inputs.types import NamesLike, Transformed, TrialsLike
 from ..inputs.validation import (
-    PerformanceTransformerMixin,
-    check_performances,
+    TrialTransformerMixin,
     check_transformed,
+    check_trials,
     restore,
 )
 from ..inputs.wording import counted
@@ -35,7 +35,7 @@ class ASpace(
     DocumentedMixin,
     LongWorkMixin,
     ClassNamePrefixFeaturesOutMixin,
-    PerformanceTransformerMixin,
+    TrialTransformerMixin,
     BaseEstimator,
 ):
     """Principal components of all poses of a movement: few numbers instead of many.
@@ -46,11 +46,11 @@ class ASpace(
     >>> import numpy as np
     >>> from sklearn_motionsync import ASpace
     >>> t = np.linspace(0, 1, 50)
-    >>> performances = [np.column_stack([x, 2 * x, 0 * x]) for x in (t, t**2)]
-    >>> aspace = ASpace(0.95).fit(performances)
+    >>> trials = [np.column_stack([x, 2 * x, 0 * x]) for x in (t, t**2)]
+    >>> aspace = ASpace(0.95).fit(trials)
     >>> aspace.n_components_
     1
-    >>> [x.shape for x in aspace.transform(performances)]
+    >>> [x.shape for x in aspace.transform(trials)]
     [(50, 1), (50, 1)]
 
     Parameters
@@ -63,11 +63,11 @@ class ASpace(
     components_ : ndarray, shape (b, n_features)
         The eigenvectors, as rows.
     mean_ : ndarray, shape (n_features,)
-        The mean posture.
+        The mean pose.
     explained_variance_ : ndarray, shape (b,)
         The eigenvalues, the variances along the components.
     explained_variance_ratio_ : ndarray, shape (b,)
-        Their shares of the whole variance (0 where all postures are the same).
+        Their shares of the whole variance (0 where all poses are the same).
     n_components_ : int
         ``b``.
     residual_variance_ : float
@@ -80,14 +80,14 @@ class ASpace(
         Frames after which the correlation of poses with later ones has fallen to 1/e. 0 after a fit
         on rows, which have no order.
     n_features_in_ : int
-        Features of a posture.
+        Features of a pose.
     feature_names_in_ : ndarray of str
         Names of the columns; only if the input had names.
 
     See Also
     --------
-    DirectionCosines : Postures from joint positions.
-    DenseSynchronizer : Synchronises the projected performances.
+    DirectionCosines : Poses from joint positions.
+    DenseSynchronizer : Synchronises the projected trials.
 
     Notes
     -----
@@ -117,12 +117,12 @@ class ASpace(
     >>> gappy = [x.copy() for x in bunch.data]
     >>> gappy[0][30:60, elbow : elbow + 3] = np.nan
     >>> cosines = DirectionCosines(bunch.skeleton, hidden="nan").fit(gappy)
-    >>> postures = cosines.transform(gappy)
-    >>> aspace = ASpace().fit(postures)
+    >>> poses = cosines.transform(gappy)
+    >>> aspace = ASpace().fit(poses)
     >>> names = cosines.get_feature_names_out()
     >>> names[aspace.missing_ > 0].tolist()[:3], round(float(aspace.missing_.max()), 3)
     (['left_arm_x', 'left_arm_y', 'left_arm_z'], 0.049)
-    >>> bool(np.isnan(aspace.transform(postures)[0]).any())
+    >>> bool(np.isnan(aspace.transform(poses)[0]).any())
     False
     """
 
@@ -137,13 +137,13 @@ class ASpace(
         self.n_components = n_components
 
     @validated
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
+    def fit(self, X: TrialsLike, y: object = None) -> Self:
         """Find the components.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances, or postures in rows; NaN where something was not seen.
+            Trials, or poses in rows; NaN where something was not seen.
         y : ignored
             Present for API consistency.
 
@@ -155,35 +155,35 @@ class ASpace(
         Raises
         ------
         ValueError
-            If there are fewer than two postures, or fewer than ``n_components`` postures or
-            features; if a feature was seen in fewer than two postures.
+            If there are fewer than two poses, or fewer than ``n_components`` poses or
+            features; if a feature was seen in fewer than two poses.
 
         Warns
         -----
         UserWarning
-            If a feature was seen in fewer postures than there are features: too few to learn how it
+            If a feature was seen in fewer poses than there are features: too few to learn how it
             depends on the others.
         """
-        arrays = check_performances(self, X, reset=True, level="posture", finite="allow-nan")
-        postures = np.concatenate(arrays)
-        has_gaps = is_gappy(postures)
-        if len(postures) < 2:
-            raise ValueError("ASpace needs at least 2 postures, got n_samples=1.")
-        missing = np.zeros(postures.shape[1])
+        arrays = check_trials(self, X, reset=True, level="pose", finite="allow-nan")
+        poses = np.concatenate(arrays)
+        has_gaps = is_gappy(poses)
+        if len(poses) < 2:
+            raise ValueError("ASpace needs at least 2 poses, got n_samples=1.")
+        missing = np.zeros(poses.shape[1])
         if has_gaps:
-            hidden = np.isnan(postures)
+            hidden = np.isnan(poses)
             self._check_seen(hidden)
-            missing, postures = hidden.mean(axis=0), postures[~hidden.all(axis=1)]
-        most = min(postures.shape)
+            missing, poses = hidden.mean(axis=0), poses[~hidden.all(axis=1)]
+        most = min(poses.shape)
         if isinstance(self.n_components, Integral) and self.n_components > most:
             raise ValueError(
                 f"n_components={self.n_components} is more than the "
-                f"{counted(len(postures), 'posture')} of {counted(postures.shape[1], 'feature')} "
+                f"{counted(len(poses), 'pose')} of {counted(poses.shape[1], 'feature')} "
                 f"can span; use at most {most}, or a share of the variance such as 0.95."
             )
         with self._progress(fits=True):
             estimate = _components_of_seen if has_gaps else _components
-            mean, components, variance, covariance = estimate(postures)
+            mean, components, variance, covariance = estimate(poses)
         b = self._count(variance)
         filler = Filler.of(mean, covariance, [] if arrays.kind == "rows" else arrays)
         self.components_ = np.ascontiguousarray(components[:b])
@@ -198,31 +198,31 @@ class ASpace(
         self.correlation_time_ = filler.times[0]
         return self
 
-    def transform(self, X: PerformancesLike) -> Transformed:
-        """Project postures into the aSpace (Eq. 5).
+    def transform(self, X: TrialsLike) -> Transformed:
+        """Project poses into the aSpace (Eq. 5).
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances, or postures in rows; NaN where something was not seen.
+            Trials, or poses in rows; NaN where something was not seen.
 
         Returns
         -------
         list of ndarray (n_frames_i, b), or ndarray
-            Points of the aSpace, of the same kind as ``X``; a ``(performance, frame)`` frame under
-            ``set_output(transform="pandas")``. NaN where nothing of a posture was seen.
+            Points of the aSpace, of the same kind as ``X``; a ``(trial, frame)`` frame under
+            ``set_output(transform="pandas")``. NaN where nothing of a pose was seen.
         """
         check_is_fitted(self, "components_")
-        performances = check_performances(self, X, reset=False, level="posture", finite="allow-nan")
-        components, timed = self.components_.T, performances.kind != "rows"
+        trials = check_trials(self, X, reset=False, level="pose", finite="allow-nan")
+        components, timed = self.components_.T, trials.kind != "rows"
         arrays = []
-        for a in performances:
+        for a in trials:
             whole = self._filled(a, timed) if is_gappy(a) else a
             arrays.append(((whole - self.mean_) @ components).astype(a.dtype, copy=False))
-        return restore(self, performances, arrays)
+        return restore(self, trials, arrays)
 
-    def inverse_transform(self, X: PerformancesLike) -> Transformed:
-        """Reconstruct postures from points of the aSpace; exact if all components were kept.
+    def inverse_transform(self, X: TrialsLike) -> Transformed:
+        """Reconstruct poses from points of the aSpace; exact if all components were kept.
 
         Parameters
         ----------
@@ -232,16 +232,14 @@ class ASpace(
         Returns
         -------
         list of ndarray (n_frames_i, n_features), or ndarray
-            Postures, of the same kind as ``X``; NaN where a coordinate is NaN.
+            Poses, of the same kind as ``X``; NaN where a coordinate is NaN.
         """
         check_is_fitted(self, "components_")
         names = self.get_feature_names_out()
-        performances = check_transformed(self, X, names, finite="allow-nan")
-        arrays = [
-            (a @ self.components_ + self.mean_).astype(a.dtype, copy=False) for a in performances
-        ]
+        trials = check_transformed(self, X, names, finite="allow-nan")
+        arrays = [(a @ self.components_ + self.mean_).astype(a.dtype, copy=False) for a in trials]
         columns = getattr(self, "feature_names_in_", range(self.n_features_in_))
-        return restore(self, performances, arrays, columns=columns)
+        return restore(self, trials, arrays, columns=columns)
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the coordinates: ``aspace0``, ``aspace1``, ...
@@ -271,31 +269,31 @@ class ASpace(
         return self.n_components_
 
     def _filled(self, array, timed):
-        """An array without gaps, but for postures of which nothing was seen."""
+        """An array without gaps, but for poses of which nothing was seen."""
         whole = self._filler.expect(array, timed)
         whole[np.isnan(array).all(axis=1)] = np.nan
         return whole
 
     def _check_seen(self, hidden):
-        """Refuse features that were never seen, by what is hidden (n_postures, n_features)."""
+        """Refuse features that were never seen, by what is hidden (n_poses, n_features)."""
         seen, n_features = len(hidden) - hidden.sum(axis=0), hidden.shape[1]
         names = getattr(self, "feature_names_in_", None)
         called = [f"{k}" if names is None else f"{k} ({names[k]!r})" for k in range(n_features)]
         if seen.min() < 2:
             k = int(seen.argmin())
-            times = "never seen" if seen[k] == 0 else "seen in one posture only"
+            times = "never seen" if seen[k] == 0 else "seen in one pose only"
             raise ValueError(
                 f"Feature {called[k]} was {times}. Of {counted(n_features, 'feature')} "
-                f"{(seen < 2).sum()} was seen in fewer than 2 postures: leave such out, or fit on "
-                "performances that show them."
+                f"{(seen < 2).sum()} was seen in fewer than 2 poses: leave such out, or fit on "
+                "trials that show them."
             )
         if seen.min() < n_features:
             k = int(seen.argmin())
             warnings.warn(
-                f"Feature {called[k]} was seen in {counted(int(seen[k]), 'posture')} of "
-                f"{len(hidden)}, and a posture has {counted(n_features, 'feature')}: fewer "
-                "postures than features hardly tell what it is where it is hidden. Leave it out, "
-                "or fit on performances that show it.",
+                f"Feature {called[k]} was seen in {counted(int(seen[k]), 'pose')} of "
+                f"{len(hidden)}, and a pose has {counted(n_features, 'feature')}: fewer "
+                "poses than features hardly tell what it is where it is hidden. Leave it out, "
+                "or fit on trials that show it.",
                 UserWarning,
                 stacklevel=2,
             )
@@ -309,22 +307,22 @@ class ASpace(
         return int(np.argmax(reached)) + 1
 
 
-def _components(postures):
-    """Mean, eigenvectors and eigenvalues of the covariance of postures, and that itself."""
-    # Of postures that are all equal PCA divides 0 by 0.
+def _components(poses):
+    """Mean, eigenvectors and eigenvalues of the covariance of poses, and that itself."""
+    # Of poses that are all equal PCA divides 0 by 0.
     with np.errstate(invalid="ignore"):
-        pca = PCA().set_output(transform="default").fit(postures)
+        pca = PCA().set_output(transform="default").fit(poses)
     variance, components = pca.explained_variance_, pca.components_
     return pca.mean_, components, variance, (components.T * variance) @ components
 
 
-def _components_of_seen(postures):
-    """The same of postures with gaps, by what was seen of them."""
-    mean, covariance = moments_of_seen([postures])
-    covariance *= len(postures) / (len(postures) - 1)
+def _components_of_seen(poses):
+    """The same of poses with gaps, by what was seen of them."""
+    mean, covariance = moments_of_seen([poses])
+    covariance *= len(poses) / (len(poses) - 1)
     variance, vectors = np.linalg.eigh(covariance)
-    largest = slice(None, -1 - min(postures.shape), -1)
+    largest = slice(None, -1 - min(poses.shape), -1)
     _, components = svd_flip(None, vectors.T[largest], u_based_decision=False)
     variance = np.maximum(variance[largest], 0)
-    mean, components, variance = (x.astype(postures.dtype) for x in (mean, components, variance))
+    mean, components, variance = (x.astype(poses.dtype) for x in (mean, components, variance))
     return mean, components, variance, covariance

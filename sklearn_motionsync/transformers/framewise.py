@@ -1,4 +1,4 @@
-"""FrameWise: any transformer of rows, applied to the frames of performances."""
+"""FrameWise: any transformer of rows, applied to the frames of trials."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, column_names
-from ..inputs.types import NamesLike, PerformancesLike, Transformed
+from ..inputs.types import NamesLike, Transformed, TrialsLike
 from ..inputs.validation import (
-    PerformanceTransformerMixin,
-    check_performances,
+    TrialTransformerMixin,
     check_transformed,
+    check_trials,
     restore,
 )
 from ..utils.doc_links import DocumentedMixin
@@ -35,11 +35,11 @@ def _goes_back(self):
     return self.__dict__.get("_inverts", hasattr(self.transformer, "inverse_transform"))
 
 
-class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, BaseEstimator):
-    """Apply a transformer of rows, such as ``StandardScaler``, to the frames of performances.
+class FrameWise(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstimator):
+    """Apply a transformer of rows, such as ``StandardScaler``, to the frames of trials.
 
-    The transformer is fitted on the pooled frames of all performances. A scaler therefore scales a
-    feature by one number for all performances, and the differences between subjects remain.
+    The transformer is fitted on the pooled frames of all trials. A scaler therefore scales a
+    feature by one number for all trials, and the differences between subjects remain.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, Bas
 
     See Also
     --------
-    ASpace : Principal components of postures.
+    ASpace : Principal components of poses.
 
     Notes
     -----
@@ -90,13 +90,13 @@ class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, Bas
         self.transformer = transformer
 
     @validated_with_nested
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
+    def fit(self, X: TrialsLike, y: object = None) -> Self:
         """Fit a clone of the transformer on all frames.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances, or postures in rows.
+            Trials, or poses in rows.
         y : ignored
             Present for API consistency.
 
@@ -111,14 +111,12 @@ class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, Bas
             If the input breaks the contract, the transformer needs a ``y``, or its output is not a
             row of numbers a frame.
         """
-        performances = check_performances(
-            self, X, reset=True, level="posture", finite=self._finite()
-        )
+        trials = check_trials(self, X, reset=True, level="pose", finite=self._finite())
         transformer, name = clone(self.transformer), "fitting the transformer"
         with self._progress(fits=True) as progress, progress.fitting(transformer, name):
-            transformer.fit(self._named(np.concatenate(performances)))
-        table = transformer.transform(self._named(performances[0]))
-        rows = self._as_rows(table, performances, 0)
+            transformer.fit(self._named(np.concatenate(trials)))
+        table = transformer.transform(self._named(trials[0]))
+        rows = self._as_rows(table, trials, 0)
         inverts = _inverts(transformer, rows[:1])
         self.transformer_ = transformer
         # The names of FunctionTransformer are those of the table that it returns.
@@ -127,32 +125,30 @@ class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, Bas
         self._inverts = inverts
         return self
 
-    def transform(self, X: PerformancesLike) -> Transformed:
-        """Transform the frames of performances.
+    def transform(self, X: TrialsLike) -> Transformed:
+        """Transform the frames of trials.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances, or postures in rows.
+            Trials, or poses in rows.
 
         Returns
         -------
         list of ndarray (n_frames_i, n_features_out), or ndarray
-            Transformed frames, of the same kind as ``X``; a ``(performance, frame)`` frame under
+            Transformed frames, of the same kind as ``X``; a ``(trial, frame)`` frame under
             ``set_output(transform="pandas")``.
         """
         check_is_fitted(self, "transformer_")
-        performances = check_performances(
-            self, X, reset=False, level="posture", finite=self._finite()
-        )
+        trials = check_trials(self, X, reset=False, level="pose", finite=self._finite())
         arrays = [
-            self._as_rows(self.transformer_.transform(self._named(x)), performances, i)
-            for i, x in enumerate(performances)
+            self._as_rows(self.transformer_.transform(self._named(x)), trials, i)
+            for i, x in enumerate(trials)
         ]
-        return restore(self, performances, arrays)
+        return restore(self, trials, arrays)
 
     @available_if(_goes_back)
-    def inverse_transform(self, X: PerformancesLike) -> Transformed:
+    def inverse_transform(self, X: TrialsLike) -> Transformed:
         """Invert the transform of frames, if the transformer can.
 
         Parameters
@@ -167,13 +163,13 @@ class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, Bas
         """
         check_is_fitted(self, "transformer_")
         names = self.get_feature_names_out()
-        performances = check_transformed(self, X, names, finite=self._finite())
+        trials = check_transformed(self, X, names, finite=self._finite())
         arrays = [
-            self._as_rows(self.transformer_.inverse_transform(x.copy()), performances, i)
-            for i, x in enumerate(performances)
+            self._as_rows(self.transformer_.inverse_transform(x.copy()), trials, i)
+            for i, x in enumerate(trials)
         ]
         columns = getattr(self, "feature_names_in_", range(self.n_features_in_))
-        return restore(self, performances, arrays, columns=columns)
+        return restore(self, trials, arrays, columns=columns)
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the features that the transformer gives.
@@ -231,9 +227,9 @@ class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, Bas
         # Row by row in memory with names, too: sums do not depend on them.
         return frames if names is None else pd.DataFrame(frames, columns=names, copy=False)
 
-    def _as_rows(self, rows, performances, i):
-        """The output of the transformer for a performance, checked: a row of numbers a frame."""
-        what, n_frames = performances.called(i), len(performances[i])
+    def _as_rows(self, rows, trials, i):
+        """The output of the transformer for a trial, checked: a row of numbers a frame."""
+        what, n_frames = trials.called(i), len(trials[i])
         if issparse(rows):
             raise TypeError(
                 f"{self._name} gives a sparse matrix, and frames are arrays: let it give arrays, "

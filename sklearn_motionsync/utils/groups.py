@@ -1,4 +1,4 @@
-"""Groups and class labels of performances: the one place that checks and encodes them."""
+"""Groups and class labels of trials: the one place that checks and encodes them."""
 
 import reprlib
 from collections.abc import Iterable, Mapping, Set, Sized
@@ -29,15 +29,15 @@ _DATES = "Mm"
 
 
 def encode_groups(
-    groups, n_performances, *, name="groups", at_least=1, sort=False
+    groups, n_trials, *, name="groups", at_least=1, sort=False
 ) -> tuple[np.ndarray, list]:
-    """Encode the group of each performance as an integer from 0.
+    """Encode the group of each trial as an integer from 0.
 
     Parameters
     ----------
-    groups : array-like, shape (n_performances,), or None
-        Text, numbers or dates. None: each performance is a group of its own.
-    n_performances : int
+    groups : array-like, shape (n_trials,), or None
+        Text, numbers or dates. None: each trial is a group of its own.
+    n_trials : int
     name : str, default="groups"
         The parameter's name, for messages.
     at_least : int, default=1
@@ -47,14 +47,14 @@ def encode_groups(
 
     Returns
     -------
-    codes : ndarray of int, shape (n_performances,)
+    codes : ndarray of int, shape (n_trials,)
     labels : list
-        The label of each code. Without groups, the performances' indices.
+        The label of each code. Without groups, the trials' indices.
 
     Raises
     ------
     ValueError
-        If there is not one label for each performance, a label is missing, labels do not sort, or
+        If there is not one label for each trial, a label is missing, labels do not sort, or
         there are too few different ones.
 
     Examples
@@ -64,7 +64,7 @@ def encode_groups(
     (array([0, 1, 0]), ['bob', 'ann'])
     """
     if groups is None:
-        return np.arange(n_performances), list(range(n_performances))
+        return np.arange(n_trials), list(range(n_trials))
     if (
         not (isinstance(groups, Iterable) and isinstance(groups, Sized))
         or isinstance(groups, _NOT_LISTS)
@@ -72,13 +72,12 @@ def encode_groups(
     ):
         got = f"shape {groups.shape}" if hasattr(groups, "shape") else reprlib.repr(groups)
         raise ValueError(
-            f"{name} must be a list or 1-D array with one label for each performance, such as its "
+            f"{name} must be a list or 1-D array with one label for each trial, such as its "
             f"subject; got {got}."
         )
-    if len(groups) != n_performances:
+    if len(groups) != n_trials:
         raise ValueError(
-            f"{name} must have one label for each performance, got {len(groups)} for "
-            f"{n_performances}."
+            f"{name} must have one label for each trial, got {len(groups)} for {n_trials}."
         )
     given = _check_labels(groups, name)
     labels = list(dict.fromkeys(given))
@@ -92,19 +91,19 @@ def encode_groups(
     return np.array([code[label] for label in given]), labels
 
 
-def names_of_groups(groups, n_performances, *, name="groups"):
-    """The group of each performance as text, a list; refuses what `encode_groups` refuses."""
-    codes, labels = encode_groups(groups, n_performances, name=name)
+def names_of_groups(groups, n_trials, *, name="groups"):
+    """The group of each trial as text, a list; refuses what `encode_groups` refuses."""
+    codes, labels = encode_groups(groups, n_trials, name=name)
     return [str(labels[code]) for code in codes]
 
 
-def encode_classes(y, performances, estimator_name):
-    """Encode the class of each performance as an integer from 0.
+def encode_classes(y, trials, estimator_name):
+    """Encode the class of each trial as an integer from 0.
 
     Parameters
     ----------
     y : array-like, shape (n_sequences,)
-    performances : sequence
+    trials : sequence
     estimator_name : str
         For messages.
 
@@ -117,7 +116,7 @@ def encode_classes(y, performances, estimator_name):
     Raises
     ------
     ValueError
-        If there is not one class for each performance, a class is missing, classes do not sort, or
+        If there is not one class for each trial, a class is missing, classes do not sort, or
         all are equal.
     """
     if y is None:
@@ -126,7 +125,7 @@ def encode_classes(y, performances, estimator_name):
         # NumPy's text of any length, which scikit-learn does not take.
         y = y.astype(object)
     column = column_or_1d(y, warn=True)
-    check_consistent_length(performances, column)
+    check_consistent_length(trials, column)
     # Of the input: an array of mixed types would be one of text.
     given = _check_labels(np.asarray(y, dtype=object).ravel(), "y")
     if column.dtype.kind not in _DATES:
@@ -136,14 +135,14 @@ def encode_classes(y, performances, estimator_name):
     classes, codes = np.unique(column, return_inverse=True)
     if len(classes) < 2:
         raise ValueError(
-            f"{estimator_name} needs performances of at least 2 classes, got one class: "
+            f"{estimator_name} needs trials of at least 2 classes, got one class: "
             f"{classes.tolist()[0]!r}. An ActionDetector learns a single action."
         )
     return classes, codes
 
 
 def add_unknown_label(classes, label=None):
-    """The classes and, behind them, the label of performances that belong to none of them.
+    """The classes and, behind them, the label of trials that belong to none of them.
 
     Parameters
     ----------
@@ -174,7 +173,7 @@ def add_unknown_label(classes, label=None):
         if label is not None:
             raise ValueError(
                 f"unknown_label={label!r} must be None, as the classes are of dtype "
-                f"{classes.dtype}: rejected performances get NaT."
+                f"{classes.dtype}: rejected trials get NaT."
             )
         return np.append(classes, np.array("NaT", classes.dtype))
     is_text = classes.dtype.kind in "UO"
@@ -191,7 +190,7 @@ def add_unknown_label(classes, label=None):
     if label in labels[:-1]:
         raise ValueError(
             f"unknown_label={label!r} is one of the classes: choose another label for rejected "
-            "performances."
+            "trials."
         )
     larger = [None] if is_text else [np.int64, np.uint64, np.float64]
     for dtype in [classes.dtype, *larger]:
@@ -225,9 +224,9 @@ def mean_of_others(values, codes):
     return means[codes]
 
 
-def group_counts(performances, codes):
-    """How many performances of each group show each value: (n_groups, P, n_features)."""
-    return sums_of_groups(~np.isnan(performances), codes)[0]
+def group_counts(trials, codes):
+    """How many trials of each group show each value: (n_groups, P, n_features)."""
+    return sums_of_groups(~np.isnan(trials), codes)[0]
 
 
 def _check_held(column, labels):
@@ -250,8 +249,8 @@ def _check_labels(labels, name):
             )
         if pd.isna(label):
             raise ValueError(
-                f"{name}[{i}] is missing, {label!r}: give performance {i} a label, or leave the "
-                "performance out."
+                f"{name}[{i}] is missing, {label!r}: give trial {i} a label, or leave the "
+                "trial out."
             )
     try:
         sorted(set(labels))

@@ -1,4 +1,4 @@
-"""The synchronizer of a pipeline, and the performances and parameters that are routed to it."""
+"""The synchronizer of a pipeline, and the trials and parameters that are routed to it."""
 
 import inspect
 from contextlib import contextmanager
@@ -34,7 +34,7 @@ _OF_KEYFRAMES = ("keyframes", "frame_rate")
 
 
 class MissingMetadata(ValueError):
-    """A synchronizer needs more than performances, such as key-frames.
+    """A synchronizer needs more than trials, such as key-frames.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Routed(NamedTuple):
     before : Pipeline or None
         The steps before.
     synchronizer : estimator
-    performances : sequence of ndarray (n_frames_i, n_features)
+    trials : sequence of ndarray (n_frames_i, n_features)
         Checked: the methods of the synchronizer take them without checking again.
     params : dict
         Other arguments of its ``match``, such as ``keyframes``.
@@ -91,29 +91,29 @@ class Routed(NamedTuple):
 
     before: Pipeline | None
     synchronizer: object
-    performances: tuple
+    trials: tuple
     params: dict
     caller: str
     hint: str
 
     @property
     def takes_params(self):
-        """Whether ``match`` takes more than performances."""
+        """Whether ``match`` takes more than trials."""
         return len(inspect.signature(self.synchronizer.match).parameters) > 1
 
     def match(self):
-        """The performances matched to the pattern."""
+        """The trials matched to the pattern."""
         with explain_missing(self.caller, self.hint):
-            return self.synchronizer.match(self.performances, **self.params)
+            return self.synchronizer.match(self.trials, **self.params)
 
 
 def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
-    """The synchronizer of an estimator, and its input made of raw performances.
+    """The synchronizer of an estimator, and its input made of raw trials.
 
     Parameters
     ----------
     estimator : synchronizer, or Pipeline with one
-    X : performances, as the estimator takes them
+    X : trials, as the estimator takes them
     params : dict
         Other arguments by name, of ``match`` and of ``transform`` of the steps before; each method
         is given those that it accepts. None is as not given.
@@ -141,9 +141,9 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     check_is_fitted(synchronizer)
     also = [getattr(synchronizer, name) for name in uses]
     features = transform_through(before, X, params, caller, hint=hint, also=also)
-    performances = synchronizer.check_performances(features)
+    trials = synchronizer.check_trials(features)
     accepted = accepted_params(synchronizer.match, params)
-    return Routed(before, synchronizer, performances, accepted, caller, hint)
+    return Routed(before, synchronizer, trials, accepted, caller, hint)
 
 
 def with_frame_rate(params, frame_rate):
@@ -157,7 +157,7 @@ def with_frame_rate(params, frame_rate):
 
 
 def transform_through(before, X, params, caller, *, hint="", also=()):
-    """Performances after the steps of a pipeline, each given the params that it accepts.
+    """Trials after the steps of a pipeline, each given the params that it accepts.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
 
     Returns
     -------
-    performances, as the last step gives them
+    trials, as the last step gives them
     """
     methods = [] if before is None else [step.transform for step in flat_steps(before)]
     takers = [*methods, *also]
@@ -230,10 +230,10 @@ def find_step(estimator, kind):
 
 
 def find_synchronizer(estimator):
-    """The same for a step with ``match`` and ``check_performances``."""
+    """The same for a step with ``match`` and ``check_trials``."""
 
     def matches(step):
-        return hasattr(step, "match") and hasattr(step, "check_performances")
+        return hasattr(step, "match") and hasattr(step, "check_trials")
 
     return _find(estimator, matches, "synchronizer")
 
@@ -285,12 +285,12 @@ def steps_to_fit(estimator, prefix=""):
     return [(prefix, estimator)] if inner is None else steps_to_fit(inner, prefix)
 
 
-def index_of_pattern(synchronizer, performances):
-    """The index of the pattern among checked performances; None if it is not one of them."""
+def index_of_pattern(synchronizer, trials):
+    """The index of the pattern among checked trials; None if it is not one of them."""
     index = synchronizer.pattern_index_
-    if index is None or index >= len(performances):
+    if index is None or index >= len(trials):
         return None
-    pattern = synchronizer.normalize(performances.take([index]))[0]
+    pattern = synchronizer.normalize(trials.take([index]))[0]
     # The gaps of the pattern are filled.
     same = (pattern == synchronizer.pattern_) | np.isnan(pattern)
     return index if same.all() else None

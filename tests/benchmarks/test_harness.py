@@ -121,7 +121,7 @@ def test_number_of_real_events_is_the_documented_one(harness, real_data):
 
 @pytest.fixture
 def powers():
-    """Warps of four clips: frame p of the template is frame 99 (p / 99)^k of a clip."""
+    """Warps of four clips: frame p of the pattern is frame 99 (p / 99)^k of a clip."""
     return np.array([99 * (FRAMES / 99) ** k for k in (0.5, 0.8, 1.25, 2.0)])
 
 

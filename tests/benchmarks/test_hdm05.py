@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_archive_agrees_with_that_of_the_tests(hdm05, real_data, tmp_path, monke
     for name, array in made.items():
         assert array.dtype.kind == archive[name].dtype.kind
     assert made["positions"].dtype == np.float32
-    assert len(load_performances(output).data) == 3
+    assert len(load_trials(output).data) == 3
 
 
 def test_find_clips_finds_all_clips_of_the_archive_in_its_order(hdm05, real_data, tmp_path):

@@ -16,7 +16,7 @@ def curve(phase):
 
 @pytest.fixture
 def known(live):
-    """A movement of a hundred frames, of which performances usually have 199."""
+    """A movement of a hundred frames, of which trials usually have 199."""
     mean = curve(np.arange(100.0))
     return live.Known(mean, 199.0)
 
@@ -73,7 +73,7 @@ def test_open_end_dtw_equals_the_row_minimum(live, known):
     total = path_costs(cdist(ticks, known.mean))
     i, j = np.indices(total.shape)
     expected = (total / (i + j + 1)).argmin(axis=1)
-    found = live.open_end_dtw(known, clip, kind="postures")
+    found = live.open_end_dtw(known, clip, kind="poses")
     np.testing.assert_array_equal(found[:: round(known.tick)], expected)
 
 

@@ -1,4 +1,4 @@
-"""The benchmark of action models: wrong performances, people held out, and the tables."""
+"""The benchmark of action models: wrong trials, people held out, and the tables."""
 
 import numpy as np
 import pytest
@@ -16,10 +16,8 @@ def model(benchmark):
 def clips(model):
     """Nine bends of three people, three each, and the same backwards."""
     clips = model.as_clips("few", make_bending(9, n_actors=3, n_frames=40, random_state=0))
-    postures = clips.postures + [x[::-1] for x in clips.postures]
-    return model.Clips(
-        "few", postures, np.repeat(["bending", "rising"], 9), np.tile(clips.actors, 2)
-    )
+    poses = clips.poses + [x[::-1] for x in clips.poses]
+    return model.Clips("few", poses, np.repeat(["bending", "rising"], 9), np.tile(clips.actors, 2))
 
 
 X = np.array([[0.0, 1], [2, 3], [4, 5], [6, 7], [13, 14]])
@@ -36,7 +34,7 @@ X = np.array([[0.0, 1], [2, 3], [4, 5], [6, 7], [13, 14]])
         ("backwards", [[13, 14], [6, 7], [4, 5], [2, 3], [0, 1]]),
     ],
 )
-def test_faults_are_put_into_correct_performances(model, kind, expected):
+def test_faults_are_put_into_correct_trials(model, kind, expected):
     given = X.copy()
     np.testing.assert_allclose(model.SPOILT[kind](given), expected)
     np.testing.assert_array_equal(given, X)
@@ -55,7 +53,7 @@ def test_tested_subjects_are_not_in_the_training_set(model, clips):
     for right, wrong in zip(fold.raw["own"], fold.raw["other actions"], strict=True):
         np.testing.assert_allclose(wrong, right[::-1])
     # Changing the held-out subjects changes nothing that is learnt.
-    changed = [x + (clips.actors[i] == held) for i, x in enumerate(clips.postures)]
+    changed = [x + (clips.actors[i] == held) for i, x in enumerate(clips.poses)]
     changed = model.Clips(clips.name, changed, clips.actions, clips.actors)
     again = model.hold_out(changed, "bending", held)
     np.testing.assert_array_equal(again.on_clock, fold.on_clock)
@@ -113,7 +111,7 @@ def test_all_tables_of_a_tiny_set(model, clips, capsys, monkeypatch):
 
 
 def test_number_of_held_out_clips_is_the_documented_one(model, real_data):
-    found = {c.name: (len(c.postures), len(c.folds())) for c in model.read_clips(real_data)}
+    found = {c.name: (len(c.poses), len(c.folds())) for c in model.read_clips(real_data)}
     assert found == {
         "HDM05": (132, 24),
         "UTKinect": (189, 99),

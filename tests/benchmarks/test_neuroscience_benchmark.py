@@ -11,13 +11,13 @@ def neuroscience(benchmark):
     return benchmark("neuroscience")
 
 
-def test_template_is_sampled_between_bins_and_held_beyond_its_ends(neuroscience):
+def test_pattern_is_sampled_between_bins_and_held_beyond_its_ends(neuroscience):
     rng = np.random.default_rng(0)
-    template = rng.random((neuroscience.BINS, 3))
+    pattern = rng.random((neuroscience.BINS, 3))
     positions = rng.uniform(-20, neuroscience.BINS + 20, (4, 50))
     bins = np.arange(neuroscience.BINS)
-    expected = [[np.interp(one, bins, neuron) for neuron in template.T] for one in positions]
-    found = neuroscience.sample(template, positions)
+    expected = [[np.interp(one, bins, neuron) for neuron in pattern.T] for one in positions]
+    found = neuroscience.sample(pattern, positions)
     np.testing.assert_allclose(found, np.swapaxes(expected, 1, 2), rtol=0, atol=1e-12)
 
 
@@ -47,9 +47,9 @@ def test_held_out_share_equals_its_definition(neuroscience):
     missed = total = 0.0
     for k in range(neuroscience.FOLDS):
         known = np.delete(counts, slice(k, None, neuroscience.FOLDS), axis=0)
-        template = neuroscience.average(known, positions[: len(known)])
+        pattern = neuroscience.average(known, positions[: len(known)])
         for trial in counts[k :: neuroscience.FOLDS]:
-            missed += ((trial - template) ** 2).sum()
+            missed += ((trial - pattern) ** 2).sum()
             total += ((trial - known.mean(axis=(0, 1))) ** 2).sum()
     assert neuroscience.held_out_r2(counts, positions) == pytest.approx(1 - missed / total)
     assert missed > total  # there is nothing to be explained

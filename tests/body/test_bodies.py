@@ -49,7 +49,7 @@ def test_features_do_not_depend_on_the_unit(made, recording, dtype, factor):
     np.testing.assert_allclose(far, near, atol=1e-5 if dtype == "f4" else 1e-9)
 
 
-def test_transform_of_one_performance_equals_that_of_several(made, bends):
+def test_transform_of_one_trial_equals_that_of_several(made, bends):
     fitted = made(bends.skeleton).fit(bends.data)
     for x, together in zip(bends.data[:4], fitted.transform(bends.data), strict=False):
         np.testing.assert_array_equal(fitted.transform([x])[0], together)
@@ -64,7 +64,7 @@ def with_ankle_at_knee(positions, factor=1.0):
 
 
 def test_limb_without_length_is_refused(made, recording):
-    message = r"Performance 1, frame 7: the limb 'left_leg' has no length"
+    message = r"Trial 1, frame 7: the limb 'left_leg' has no length"
     faulty = [recording, with_ankle_at_knee(recording)]
     for ask in (made().fit, made().fit_transform, made().fit([recording]).transform):
         with pytest.raises(ValueError, match=message):
@@ -74,7 +74,7 @@ def test_limb_without_length_is_refused(made, recording):
 def test_limb_as_short_as_rounding_is_refused(made, recording):
     """Joints that coincide except for the last digit give no direction."""
     X = with_ankle_at_knee(moved(recording, [7.0, 0.0, 0.0]), 1 + 2e-16)
-    with pytest.raises(ValueError, match=r"Performance 0, frame 7: the limb 'left_leg' has no le"):
+    with pytest.raises(ValueError, match=r"Trial 0, frame 7: the limb 'left_leg' has no le"):
         made().fit([X])
 
 
@@ -92,17 +92,17 @@ def test_wrong_width_is_refused(made):
 
 
 @pytest.mark.parametrize("axes", [(1, -1, -1), (1, -1, 1)])
-def test_body_upside_down_is_refused_with_its_performance(made, recording, axes):
+def test_body_upside_down_is_refused_with_its_trial(made, recording, axes):
     estimator, down = made(), turned_over(recording, axes)
-    message = r"Performance 1 is upside down.* says that 'y' is up, but '-y' seems to be\. Turn"
+    message = r"Trial 1 is upside down.* says that 'y' is up, but '-y' seems to be\. Turn"
     with pytest.raises(ValueError, match=message):
         estimator.fit([recording, down])
     with pytest.raises(ValueError, match=message):
         estimator.fit([recording]).transform([recording, down])
-    with pytest.raises(ValueError, match="Performance 0 is upside down"):
+    with pytest.raises(ValueError, match="Trial 0 is upside down"):
         estimator.transform(down)
-    with pytest.raises(ValueError, match=r"Performance 1 \('b'\) is upside down"):
-        estimator.transform(to_frame([recording, down], performances=["a", "b"]))
+    with pytest.raises(ValueError, match=r"Trial 1 \('b'\) is upside down"):
+        estimator.transform(to_frame([recording, down], trials=["a", "b"]))
 
 
 def test_random_points_are_not_taken_for_a_body_upside_down(made):

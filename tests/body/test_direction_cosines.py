@@ -1,4 +1,4 @@
-"""Postures: cosines of known bodies, and positions reconstructed from them."""
+"""Poses: cosines of known bodies, and positions reconstructed from them."""
 
 import numpy as np
 import pandas as pd
@@ -63,10 +63,10 @@ def test_parent_cosines_of_limbs_opposite_to_rest_are_unit_and_invertible(n_dims
     tilts = np.array([0, 1e-9, 1e-7, 1e-4, 1e-2])
     world = DirectionCosines(skeleton, "world").fit(x)
     for limb in ("hip", "left_arm"):
-        postures = world.transform(x)
+        poses = world.transform(x)
         place = list(world.get_feature_names_out()).index(f"{limb}_x")
-        postures[:, place], postures[:, place + 1] = -np.cos(tilts), np.sin(tilts)
-        positions = world.inverse_transform(postures)
+        poses[:, place], poses[:, place + 1] = -np.cos(tilts), np.sin(tilts)
+        positions = world.inverse_transform(poses)
         parent = DirectionCosines(skeleton, "parent").fit(positions)
         cosines = parent.transform(positions)
         lengths = np.linalg.norm(cosines[:, 1:].reshape(5, 12, n_dims), axis=2)
@@ -83,8 +83,8 @@ def test_inverse_transform_reconstructs_positions_except_place_and_heading(refer
     """Exactly, but for place and heading: the embedded body is built like the inverse's."""
     bunch = make_bending(1, noise=0, random_state=1)
     cosines = DirectionCosines(bunch.skeleton, reference)
-    postures = cosines.fit_transform(bunch.data)
-    back = cosines.inverse_transform(postures)
+    poses = cosines.fit_transform(bunch.data)
+    back = cosines.inverse_transform(poses)
     assert back[0].shape == bunch.data[0].shape
     original = bunch.data[0].reshape(-1, 15, 3)
     rebuilt = back[0].reshape(-1, 15, 3)
@@ -95,7 +95,7 @@ def test_inverse_transform_reconstructs_positions_except_place_and_heading(refer
     np.testing.assert_allclose(gaps[1], gaps[0], atol=1e-9)
     np.testing.assert_allclose(rebuilt[..., 1], original[..., 1], atol=1e-9)
     again = DirectionCosines(Skeleton.paper(), reference).fit_transform(back)
-    np.testing.assert_allclose(again[0], postures[0], atol=1e-9)
+    np.testing.assert_allclose(again[0], poses[0], atol=1e-9)
 
 
 def test_inverse_transform_uses_given_limb_lengths(recording):
@@ -110,17 +110,17 @@ def test_inverse_transform_uses_given_limb_lengths(recording):
 # -- inverse_transform --------------------------------------------------------------------
 
 
-def heights(postures):
-    return np.concatenate([x[:, 0] for x in postures])
+def heights(poses):
+    return np.concatenate([x[:, 0] for x in poses])
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_inverse_transform_keeps_the_height_of_the_pelvis(bends, dtype):
     """Of real people, whose hips are below the pelvis, and of approximations of them."""
     cosines = DirectionCosines(bends.skeleton)
-    postures = cosines.fit_transform([x.astype(dtype) for x in bends.data])
-    aspace = ASpace(3).fit(postures)
-    for given in (postures, aspace.inverse_transform(aspace.transform(postures))):
+    poses = cosines.fit_transform([x.astype(dtype) for x in bends.data])
+    aspace = ASpace(3).fit(poses)
+    for given in (poses, aspace.inverse_transform(aspace.transform(poses))):
         back = cosines.inverse_transform(given)
         again = DirectionCosines(Skeleton.paper()).fit_transform(back)
         np.testing.assert_allclose(heights(again), heights(given), atol=1e-5)
@@ -131,28 +131,28 @@ def test_inverse_transform_keeps_the_height_of_the_pelvis(bends, dtype):
 
 def test_inverse_transform_shifts_hips_by_a_quarter_of_a_leg_at_most(recording):
     cosines = DirectionCosines(Skeleton.paper())
-    (postures,) = cosines.fit_transform([recording])
+    (poses,) = cosines.fit_transform([recording])
     heights = []
     for jump in (-0.4, -0.2, 0.0, 0.2, 0.4):
-        back = cosines.inverse_transform(postures[:1] + jump * np.eye(37)[0])
+        back = cosines.inverse_transform(poses[:1] + jump * np.eye(37)[0])
         heights.append(DirectionCosines(Skeleton.paper()).fit_transform(back)[0, 0])
-    np.testing.assert_allclose(np.subtract(heights, postures[0, 0])[1:4], [-0.2, 0, 0.2], atol=1e-9)
-    assert heights[0] > postures[0, 0] - 0.4 + 0.1
-    assert heights[4] < postures[0, 0] + 0.4 - 0.1
+    np.testing.assert_allclose(np.subtract(heights, poses[0, 0])[1:4], [-0.2, 0, 0.2], atol=1e-9)
+    assert heights[0] > poses[0, 0] - 0.4 + 0.1
+    assert heights[4] < poses[0, 0] + 0.4 - 0.1
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
 def test_inverse_transform_refuses_cosines_of_length_0_and_scales_others(recording, reference):
     cosines = DirectionCosines(Skeleton.paper(), reference)
-    (postures,) = cosines.fit_transform([recording])
-    faulty, tiny = postures.copy(), postures.copy()
+    (poses,) = cosines.fit_transform([recording])
+    faulty, tiny = poses.copy(), poses.copy()
     faulty[9, 4:7] = 0
-    message = r"Performance 1, frame 9: the limb 'torso' has no direction, its cosines are 0"
+    message = r"Trial 1, frame 9: the limb 'torso' has no direction, its cosines are 0"
     with pytest.raises(ValueError, match=message):
-        cosines.inverse_transform([postures, faulty])
+        cosines.inverse_transform([poses, faulty])
     tiny[:, 1:] *= 1e-6
     np.testing.assert_allclose(
-        cosines.inverse_transform(tiny), cosines.inverse_transform(postures), atol=1e-9
+        cosines.inverse_transform(tiny), cosines.inverse_transform(poses), atol=1e-9
     )
 
 
@@ -172,20 +172,20 @@ GOOD = np.ones(12)
 )  # fmt: skip
 def test_inverse_transform_refuses_wrong_limb_lengths(recording, lengths, message):
     cosines = DirectionCosines(Skeleton.paper())
-    postures = cosines.fit_transform([recording])
+    poses = cosines.fit_transform([recording])
     with pytest.raises(ValueError, match=message):
-        cosines.inverse_transform(postures, lengths)
+        cosines.inverse_transform(poses, lengths)
 
 
 def test_limb_lengths_of_any_kind_give_the_same(recording):
     cosines = DirectionCosines(Skeleton.paper())
-    postures = cosines.fit_transform([recording])
+    poses = cosines.fit_transform([recording])
     lengths = pd.Series(cosines.limb_lengths_)
     for given in (lengths, lengths.tolist(), lengths.set_axis(
         ["hip", "torso", "shoulder", "neck", "left_thigh", "right_thigh", "left_leg", "right_leg",
          "left_arm", "right_arm", "left_forearm", "right_forearm"])):  # fmt: skip
         np.testing.assert_array_equal(
-            cosines.inverse_transform(postures, given)[0], cosines.inverse_transform(postures)[0]
+            cosines.inverse_transform(poses, given)[0], cosines.inverse_transform(poses)[0]
         )
 
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
 from sklearn_motionsync.body.formats import FORMATS
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 
 from made_bodies import columns_of
 
@@ -168,5 +168,5 @@ def test_landmarks_of_other_names_are_guessed(joints, landmarks):
     ("archive", "name"), [("hdm05/hdm05", "acclaim"), ("utkinect/utkinect", "kinect")]
 )
 def test_joints_and_parents_are_those_of_real_recordings(real_data, archive, name):
-    bunch = load_performances(real_data / f"{archive}_positions.npz")
+    bunch = load_trials(real_data / f"{archive}_positions.npz")
     assert bunch.skeleton == ready(name)

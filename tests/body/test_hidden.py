@@ -5,7 +5,7 @@ import pytest
 from sklearn.utils import get_tags
 from sklearn_motionsync import ASpace, DirectionCosines, JointPositions, Skeleton, to_frame
 from sklearn_motionsync.body.axes import fill_heading, heading_axes
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 
 from made_bodies import columns_of, standing, turned, turned_over
 
@@ -39,9 +39,9 @@ def hide(positions, frames, *joints):
     return without(positions, mask)
 
 
-def limb(cosines, postures, name):
+def limb(cosines, poses, name):
     first = list(cosines.get_feature_names_out()).index(f"{name}_x")
-    return postures[:, first : first + 3]
+    return poses[:, first : first + 3]
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_limbs_with_a_hidden_end_are_nan_and_others_unchanged(reference, n_dims,
     given[0, n_dims * JOINTS.index("head")] = np.nan
     hidden[0, JOINTS.index("head")] = True
     before = given.copy()
-    postures, whole = cosines.transform([given])[0], cosines.transform([x])[0]
+    poses, whole = cosines.transform([given])[0], cosines.transform([x])[0]
     np.testing.assert_array_equal(given, before)
     lost = {None: np.zeros(len(x), dtype=bool)}
     for name, (start, end, above) in ENDS.items():
@@ -83,9 +83,9 @@ def test_limbs_with_a_hidden_end_are_nan_and_others_unchanged(reference, n_dims,
             lost[name] |= lost[above]
     expected = whole[:, 1:].reshape(len(x), 12, n_dims).copy()
     expected[np.column_stack([lost[name] for name in ENDS])] = np.nan
-    np.testing.assert_array_equal(postures[:, 1:], expected.reshape(len(x), -1))
-    assert postures.dtype == dtype
-    np.testing.assert_array_equal(np.isnan(postures[:, 0]), hidden[:, 0])
+    np.testing.assert_array_equal(poses[:, 1:], expected.reshape(len(x), -1))
+    assert poses.dtype == dtype
+    np.testing.assert_array_equal(np.isnan(poses[:, 0]), hidden[:, 0])
 
 
 def test_hidden_nan_without_gaps_equals_hidden_raise(recordings, fitted):
@@ -106,9 +106,9 @@ def test_mean_of_joints_is_hidden_with_any_of_them():
     )
     x = np.tile([0, 2.0, 0, 0.1, 1, 0, -0.1, 1, 0, 0, 0, 0], (3, 1))
     x[1, 3] = np.nan
-    postures = DirectionCosines(markers, hidden="nan").fit(x).transform(x)
-    assert np.isnan(postures).any(axis=1).tolist() == [False, True, False]
-    np.testing.assert_array_equal(postures[2], [0, -1, 0, 0, -1, 0])
+    poses = DirectionCosines(markers, hidden="nan").fit(x).transform(x)
+    assert np.isnan(poses).any(axis=1).tolist() == [False, True, False]
+    np.testing.assert_array_equal(poses[2], [0, -1, 0, 0, -1, 0])
 
 
 # -- the heading --------------------------------------------------------------------------
@@ -156,10 +156,10 @@ def test_last_heading_stays_where_hips_and_shoulders_are_hidden(fitted):
 
 def test_hips_stay_at_the_pelvis_where_no_ankle_is_seen(recordings, fitted):
     cosines = fitted()
-    postures = cosines.transform(recordings[0])
+    poses = cosines.transform(recordings[0])
     for side in ("left", "right"):
-        limb(cosines, postures, f"{side}_leg")[:] = np.nan
-    body = cosines.inverse_transform(postures).reshape(len(postures), 15, 3)
+        limb(cosines, poses, f"{side}_leg")[:] = np.nan
+    body = cosines.inverse_transform(poses).reshape(len(poses), 15, 3)
     pelvis, left, right = (body[:, JOINTS.index(j)] for j in ("pelvis", "left_hip", "right_hip"))
     assert np.isfinite(pelvis).all()
     np.testing.assert_allclose((left + right) / 2, pelvis, atol=1e-12)
@@ -176,14 +176,14 @@ def test_limbs_before_the_first_heading_are_nan(fitted):
     x = turning([20, 20, 20, 20], [15, 15, 15, 15])
     x = hide(hide(x, [0, 1], "left_hip"), [0], "left_shoulder")
     for reference in ("heading", "parent"):
-        postures = fitted(reference).transform(x)
-        assert np.isnan(postures[0, 1:]).all()
+        poses = fitted(reference).transform(x)
+        assert np.isnan(poses[0, 1:]).all()
     cosines = fitted()
-    postures = cosines.transform(x)
-    assert np.isfinite(postures[:, 0]).all()
+    poses = cosines.transform(x)
+    assert np.isfinite(poses[:, 0]).all()
     # Without hips so far, as of a body that has none.
     np.testing.assert_allclose(
-        turn_of_x(limb(cosines, postures, "shoulder"))[1:], [0, 15, 15], atol=1e-9
+        turn_of_x(limb(cosines, poses, "shoulder"))[1:], [0, 15, 15], atol=1e-9
     )
     assert np.isfinite(limb(fitted("world"), fitted("world").transform(x), "neck")).all()
 
@@ -263,14 +263,14 @@ def test_hidden_joints_are_refused_unless_allowed(recordings, fitted):
     x = hide(recordings[0], [3], "head")
     infinite = x.copy()
     infinite[5, 0] = np.inf
-    with pytest.raises(ValueError, match="Performance 0, frame 5, feature 0 is infinity"):
+    with pytest.raises(ValueError, match="Trial 0, frame 5, feature 0 is infinity"):
         fitted().transform([infinite])
     plain = DirectionCosines(PAPER).fit(recordings)
-    with pytest.raises(ValueError, match=r"Performance 0, frame 3, .* is NaN"):
+    with pytest.raises(ValueError, match=r"Trial 0, frame 3, .* is NaN"):
         plain.transform([x])
     with pytest.raises(ValueError, match="is NaN"):
         plain.inverse_transform(fitted().transform([x]))
-    with pytest.raises(ValueError, match=r"Performance 0, frame 3, .* is NaN.*Set hidden='nan'"):
+    with pytest.raises(ValueError, match=r"Trial 0, frame 3, .* is NaN.*Set hidden='nan'"):
         JointPositions(PAPER).fit(recordings).transform([x])
     points = ASpace().fit(plain.transform(recordings)).transform(fitted().transform([x]))
     assert np.isfinite(points[0]).all()
@@ -314,7 +314,7 @@ def test_positions_of_a_body_whose_legs_are_never_seen_have_the_unit_of_fit(reco
 
 def test_visible_limbs_are_checked(recordings, fitted):
     hidden = np.random.default_rng(3).random((len(recordings[0]), 15)) < 0.1
-    with pytest.raises(ValueError, match="Performance 0 is upside down"):
+    with pytest.raises(ValueError, match="Trial 0 is upside down"):
         fitted().transform([without(turned_over(recordings[0]), hidden)])
     legs = ("left_hip", "right_hip", "left_knee", "left_ankle", "right_knee", "right_ankle")
     trunk = hide(turned_over(np.concatenate([standing()] * 5)), slice(None), *legs)
@@ -355,8 +355,8 @@ def test_body_without_hips_keeps_the_heading_of_its_shoulders():
     x = x[:, [JOINTS.index(name) for name in names]]
     cosines = DirectionCosines(trunk, hidden="nan").fit(x.reshape(4, -1))
     x[2, names.index("left_shoulder")] = np.nan
-    postures = cosines.transform(x.reshape(4, -1))
-    faces = turn_of_z(limb(cosines, postures, "neck"))
+    poses = cosines.transform(x.reshape(4, -1))
+    faces = turn_of_z(limb(cosines, poses, "neck"))
     np.testing.assert_allclose(faces, [0, 0, 30, 0], atol=1e-9)
 
 
@@ -366,14 +366,14 @@ def test_body_without_hips_keeps_the_heading_of_its_shoulders():
 @pytest.mark.parametrize("reference", REFERENCES)
 def test_inverse_transform_hides_joints_below_a_hidden_limb(reference, recordings, fitted):
     cosines = fitted(reference)
-    postures = cosines.transform(recordings[0])
+    poses = cosines.transform(recordings[0])
     names = list(cosines.get_feature_names_out())
-    whole = cosines.inverse_transform(postures).reshape(-1, 15, 3)
+    whole = cosines.inverse_transform(poses).reshape(-1, 15, 3)
     # The frame in which the lowest ankle stands on the floor stays.
     ankles = [JOINTS.index(f"{side}_ankle") for side in ("left", "right")]
     floor = whole[:, ankles, 1].min(axis=1).argmin()
-    arm, torso, height = np.flatnonzero(np.arange(len(postures)) != floor)[:3]
-    lost = postures.copy()
+    arm, torso, height = np.flatnonzero(np.arange(len(poses)) != floor)[:3]
+    lost = poses.copy()
     lost[arm, names.index("left_arm_y")] = np.nan
     lost[torso, names.index("torso_x")] = np.nan
     lost[height, 0] = np.nan
@@ -394,12 +394,12 @@ def test_inverse_transform_hides_joints_below_a_hidden_limb(reference, recording
 def test_position_matrix_equals_inverse_transform_but_for_the_shift(reference, n_dims, recordings):
     x = recordings[0].reshape(-1, 15, 3)[..., :n_dims].reshape(len(recordings[0]), -1)
     cosines = DirectionCosines(Skeleton.paper(n_dims=n_dims), reference).fit(x)
-    postures = cosines.transform(x)
+    poses = cosines.transform(x)
     for lengths in (None, 2 * cosines.limb_lengths_):
         matrix, names = cosines.position_matrix(lengths)
         assert matrix.shape == (15 * n_dims, 1 + 12 * n_dims)
         assert names == cosines.skeleton.column_names
-        off = cosines.inverse_transform(postures, lengths) - postures @ matrix.T
+        off = cosines.inverse_transform(poses, lengths) - poses @ matrix.T
         moves = np.array([name.endswith(("hip_y", "knee_y", "ankle_y")) for name in names])
         np.testing.assert_allclose(off[:, ~moves], 0, atol=1e-12)
         np.testing.assert_allclose(off[:, moves], off[0, moves][0], atol=1e-12)
@@ -416,9 +416,9 @@ def test_position_matrix_of_a_body_that_lacks_landmarks():
     x = np.tile(np.array([0.0, 0, 1, 0, 0, 2, 1, 0, 1, 3, 0, 1]), (2, 1))
     cosines = DirectionCosines(arm).fit(x)
     matrix, names = cosines.position_matrix()
-    postures = cosines.transform(x)
+    poses = cosines.transform(x)
     assert names == cosines.skeleton.body().column_names
-    np.testing.assert_allclose(postures @ matrix.T, cosines.inverse_transform(postures))
+    np.testing.assert_allclose(poses @ matrix.T, cosines.inverse_transform(poses))
 
 
 def test_position_matrix_refuses_parent_axes_and_wrong_lengths(recordings, fitted):
@@ -433,7 +433,7 @@ def test_position_matrix_refuses_parent_axes_and_wrong_lengths(recordings, fitte
 
 def test_shoulders_halve_the_error_of_the_heading_of_turning_people(real_data):
     """Joggers in a circle, hips hidden for a second, against the last heading."""
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     errors = {"shoulders": [], "held": []}
     for i in np.flatnonzero(bunch.target == "jogLeftCircle4StepsRstart"):
         x = bunch.data[i].astype(float).reshape(len(bunch.data[i]), -1, 3)

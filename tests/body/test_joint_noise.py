@@ -29,14 +29,14 @@ def columns(cosines, limb):
 def test_covariance_of_limbs_along_axes_of_the_room():
     """A direction u of length L moves by (I - u u') e / L, where e is the error of its ends."""
     cosines = fitted("world")
-    (posture,) = cosines.transform(BENDING.data[:1])
-    posture = np.repeat(posture[40:41], 1000, axis=0)
-    found = JointNoise(1e-4, cosines).covariance(posture)
+    (pose,) = cosines.transform(BENDING.data[:1])
+    pose = np.repeat(pose[40:41], 1000, axis=0)
+    found = JointNoise(1e-4, cosines).covariance(pose)
     lengths = dict(zip(cosines.skeleton.limbs, cosines.limb_lengths_, strict=True))
     thigh, shank, arm = (columns(cosines, x) for x in ("left_thigh", "left_leg", "right_arm"))
     across = {}
     for limb, own in (("left_thigh", thigh), ("left_leg", shank)):
-        u = posture[0, own]
+        u = pose[0, own]
         across[limb] = (np.eye(3) - np.outer(u, u)) / lengths[limb]
         expected = 2e-8 * across[limb] @ across[limb]
         np.testing.assert_allclose(found[np.ix_(own, own)], expected, atol=0.1 * expected.max())
@@ -75,8 +75,8 @@ def test_mean_of_markers_has_less_noise():
     markers = Skeleton(names, [-1] * len(names), landmarks=landmarks)
     data = [np.repeat(x.reshape(len(x), -1, 3), 4, axis=1) for x in BENDING.data]
     many = DirectionCosines(markers).fit([x.reshape(len(x), -1) for x in data])
-    (posture,) = fitted().transform(BENDING.data[:1])
-    one, four = (JointNoise(0.005, c).covariance(posture) for c in (fitted(), many))
+    (pose,) = fitted().transform(BENDING.data[:1])
+    one, four = (JointNoise(0.005, c).covariance(pose) for c in (fitted(), many))
     # After the height and the hips, whose errors are of second order along the heading.
     np.testing.assert_allclose(np.diag(four)[4:] / np.diag(one)[4:], 0.25, atol=0.04)
 

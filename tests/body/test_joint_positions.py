@@ -13,9 +13,9 @@ from sklearn_motionsync import (
     JointPositions,
     Skeleton,
     to_frame,
-    to_sequences,
+    to_trials,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 
 from made_bodies import standing
 
@@ -24,7 +24,7 @@ LANDMARKS = list(PAPER.joints)[1:]
 
 
 def places(body, reference="heading"):
-    """Landmark: where it is, of a body of one posture."""
+    """Landmark: where it is, of a body of one pose."""
     features = JointPositions(PAPER, reference).fit_transform([np.vstack([body, body])])[0][0]
     return dict(zip(LANDMARKS, map(tuple, features.reshape(14, 3).round(9) + 0.0), strict=True))
 
@@ -48,8 +48,8 @@ def test_positions_of_a_known_body(reference, size):
 
 
 @pytest.mark.parametrize("dtype", [float, "f4"])
-def test_unit_is_the_median_leg_of_the_performance(dtype):
-    """Of several postures, some of them with legs that are measured too long."""
+def test_unit_is_the_median_leg_of_the_trial(dtype):
+    """Of several poses, some of them with legs that are measured too long."""
     long = standing(left_ankle=(0.1, -3, 0), right_ankle=(-0.1, -3, 0))
     X = np.vstack([long, standing(), standing(), standing(), long]).astype(dtype)
     features = JointPositions(PAPER).fit_transform([2 * X])[0]
@@ -106,7 +106,7 @@ def slowly(x, skeleton, reference):
 @pytest.fixture(params=["hdm05/hdm05", "utkinect/utkinect"])
 def people(request, real_data):
     """A skeleton, and a clip of each of several people and actions."""
-    bunch = load_performances(real_data / f"{request.param}_positions.npz")
+    bunch = load_trials(real_data / f"{request.param}_positions.npz")
     return bunch.skeleton, [x.astype(float) for x in bunch.data[::17]]
 
 
@@ -146,7 +146,7 @@ def expected_of(X):
         (EQUAL, EQUAL),
         (np.stack(EQUAL), EQUAL),
         ([pd.DataFrame(x, columns=NAMES) for x in BUNCH.data], BUNCH.data),
-        (to_frame(BUNCH.data, performances=LABELS, columns=NAMES), BUNCH.data),
+        (to_frame(BUNCH.data, trials=LABELS, columns=NAMES), BUNCH.data),
         ([x.astype("f4") for x in BUNCH.data], [x.astype("f4") for x in BUNCH.data]),
     ],
     ids=["list", "equal lengths", "3-D", "frames", "MultiIndex", "float32"],
@@ -157,10 +157,10 @@ def test_union_of_both_features_of_every_kind_of_collection(X, plain):
         everywhere = views().fit_transform(X)
     for table in (fitted.transform(X), in_pandas().fit_transform(X), everywhere):
         assert list(table.columns) == list(fitted.get_feature_names_out())
-        assert table.index.names == ["performance", "frame"]
+        assert table.index.names == ["trial", "frame"]
         if isinstance(X, pd.DataFrame):
             assert table.index.equals(X.index)
-        for found, right in zip(to_sequences(table), expected_of(plain), strict=True):
+        for found, right in zip(to_trials(table), expected_of(plain), strict=True):
             assert found.shape[1] == 79
             assert set(found.dtypes) == {plain[0].dtype}
             np.testing.assert_array_equal(found, right)
@@ -172,7 +172,7 @@ def test_feature_names_of_a_union_are_unique():
     assert {"directioncosines__neck_x", "jointpositions__neck_x"} < set(names)
 
 
-def test_union_without_pandas_output_refuses_performances():
+def test_union_without_pandas_output_refuses_trials():
     for X in (BUNCH.data, EQUAL, np.stack(EQUAL)):
         with pytest.raises(ValueError, match=r"shape|dimension"):
             views().fit_transform(X)

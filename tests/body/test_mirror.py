@@ -9,7 +9,7 @@ import pytest
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, mirror, to_frame
 from sklearn_motionsync.body.formats import FORMATS
 from sklearn_motionsync.body.mirror import exchange_of_sides
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 
 from made_bodies import columns_of
 
@@ -62,7 +62,7 @@ def test_positions_of_the_mirror_image_are_those_of_the_other_side():
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
 def test_mirror_image_of_the_mirror_image_is_the_original(real_data, name):
     """Its limbs have the lengths of the other side's."""
-    bunch = load_performances(real_data / f"{name}_positions.npz")
+    bunch = load_trials(real_data / f"{name}_positions.npz")
     X = bunch.data[::11]
     mirrored = mirror(X, bunch.skeleton)
     for x, again in zip(X, mirror(mirrored, bunch.skeleton), strict=True):
@@ -111,12 +111,10 @@ def test_mirror_returns_the_kind_that_was_given():
         assert mirror(x.astype("f4"), PAPER).dtype == np.float32
     stack = np.stack([x[:40] for x in X])
     np.testing.assert_array_equal(mirror(stack, PAPER), [x[:40] for x in expected])
-    table = to_frame(X, performances=["a", "b", "c"], columns=names)
+    table = to_frame(X, trials=["a", "b", "c"], columns=names)
     table.attrs["up"] = "y"
     found = mirror(table, PAPER)
-    pd.testing.assert_frame_equal(
-        found, to_frame(expected, performances=["a", "b", "c"], columns=names)
-    )
+    pd.testing.assert_frame_equal(found, to_frame(expected, trials=["a", "b", "c"], columns=names))
     assert found.attrs == {"up": "y"}
     frames = [columns_of(x).rename_axis("time") for x in X]
     for df, right in zip(mirror(frames, PAPER), expected, strict=True):
@@ -233,11 +231,11 @@ def test_mirror_refuses_wrong_input():
     with pytest.raises(ValueError, match=r"15 joints are \(n_frames, 45\)"):
         mirror(np.zeros((4, 30)), PAPER)
     table = columns_of(BUNCH.data[0])
-    with pytest.raises(ValueError, match="Performance 1: column 0 is 'neck_x'"):
+    with pytest.raises(ValueError, match="Trial 1: column 0 is 'neck_x'"):
         mirror([table, table[[*table.columns[3:], *table.columns[:3]]]], PAPER)
     with pytest.raises(ValueError, match="needs the Skeleton of the positions"):
         mirror(BUNCH.data, None)
-    with pytest.raises(ValueError, match="Found 0 performances"):
+    with pytest.raises(ValueError, match="Found 0 trials"):
         mirror([], PAPER)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.io import read_motion
 
 from made_bodies import columns_of, standing, turned
@@ -37,7 +37,7 @@ def people(request):
         bunch = make_bending(3, random_state=0)
         return bunch.skeleton, bunch.data
     folder = request.getfixturevalue("real_data")
-    bunch = load_performances(folder / f"{request.param}_positions.npz")
+    bunch = load_trials(folder / f"{request.param}_positions.npz")
     return bunch.skeleton, bunch.data[::25]
 
 
@@ -91,22 +91,22 @@ def test_body_without_hips_has_the_heading_of_its_shoulders():
 
 
 @pytest.mark.parametrize(("part", "reference"), OF_PARTS)
-def test_postures_of_reconstructed_positions_are_the_same(people, part, reference):
+def test_poses_of_reconstructed_positions_are_the_same(people, part, reference):
     skeleton, X = people
     some = DirectionCosines(only(PARTS[part], skeleton), reference).set_output(transform="pandas")
-    postures = some.fit_transform(X)
-    back = some.inverse_transform(postures)
+    poses = some.fit_transform(X)
+    back = some.inverse_transform(poses)
     body = some.skeleton.body()
     assert list(back.columns) == body.column_names
     assert set(body.joints) == set(body.landmarks) <= set(PARTS[part])
     assert body.limbs == some.skeleton.limbs
     again = DirectionCosines(body, reference).set_output(transform="pandas").fit_transform(back)
-    assert list(again.columns) == list(postures.columns)
+    assert list(again.columns) == list(poses.columns)
     # If limbs change their length, the shift of the hips limits the heights.
-    cosines = [c for c in postures if c != "pelvis_height"]
-    np.testing.assert_allclose(again[cosines], postures[cosines], atol=1e-5)
-    if "pelvis_height" in postures and part != "left half" and "HipLeft" not in skeleton.joints:
-        np.testing.assert_allclose(again["pelvis_height"], postures["pelvis_height"], atol=1e-5)
+    cosines = [c for c in poses if c != "pelvis_height"]
+    np.testing.assert_allclose(again[cosines], poses[cosines], atol=1e-5)
+    if "pelvis_height" in poses and part != "left half" and "HipLeft" not in skeleton.joints:
+        np.testing.assert_allclose(again["pelvis_height"], poses["pelvis_height"], atol=1e-5)
 
 
 def test_body_is_the_skeleton_of_the_landmarks():

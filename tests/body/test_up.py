@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 
 from made_bodies import columns_of, standing, turned_over
 
@@ -106,7 +106,7 @@ def test_up_is_estimated_unless_given(up, joints, recording):
 
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
 def test_up_of_people_is_estimated(real_data, name):
-    bunch = load_performances(real_data / f"{name}_positions.npz")
+    bunch = load_trials(real_data / f"{name}_positions.npz")
     for x in bunch.data[::2]:
         df = columns_of(raised(x.astype(float), "-z"), bunch.skeleton)
         assert Skeleton.from_frame(df).up == "-z"
@@ -114,7 +114,7 @@ def test_up_of_people_is_estimated(real_data, name):
 
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
 def test_up_of_upper_bodies_is_right_or_in_doubt(real_data, name):
-    bunch = load_performances(real_data / f"{name}_positions.npz")
+    bunch = load_trials(real_data / f"{name}_positions.npz")
     arms = [f"{side}_{part}" for side in ("left", "right") for part in ("shoulder", "wrist")]
     given = dict.fromkeys(PAPER.joints)
     given |= {at: bunch.skeleton.landmarks[at] for at in ("pelvis", "neck", "head", *arms)}
@@ -147,7 +147,7 @@ def test_body_upside_down_is_refused_for_any_axis(up, landmarks, recording):
     other = up[1:] if up.startswith("-") else f"-{up}"
     message = rf"says that '{up}' is up, but '{other}' seems to be\. .*up='{other}'"
     for kind in (DirectionCosines, JointPositions):
-        with pytest.raises(ValueError, match=f"Performance 1 is upside down: .*{message}"):
+        with pytest.raises(ValueError, match=f"Trial 1 is upside down: .*{message}"):
             kind(with_up(up, landmarks=landmarks)).fit(
                 [raised(recording, up), raised(recording, other)]
             )
@@ -156,7 +156,7 @@ def test_body_upside_down_is_refused_for_any_axis(up, landmarks, recording):
 
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
 def test_parts_of_people_are_accepted_and_upside_down_refused(real_data, name):
-    bunch = load_performances(real_data / f"{name}_positions.npz")
+    bunch = load_trials(real_data / f"{name}_positions.npz")
     for landmarks, all_tell in (
         (PAPER.joints, True),
         (LEGS, True),

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-from sklearn_motionsync import compare_events, to_frame, to_sequences
+from sklearn_motionsync import compare_events, to_frame, to_trials
 from sklearn_motionsync.datasets import make_gait
 
 GAIT = make_gait(16, 2, timing=3, random_state=0)
@@ -60,7 +60,7 @@ def test_the_level_holds_over_all_events():
 
 def test_a_table_in_seconds_without_groups():
     names = pd.MultiIndex.from_arrays([GAIT.person, GAIT.cycle], names=["subject", "trial"])
-    trials = to_sequences(to_frame(GAIT.data, performances=names))
+    trials = to_trials(to_frame(GAIT.data, trials=names))
     rows = (K.set_axis(names) / 100).rename_axis(columns="event").stack().rename("seconds")
     found = compare_events(trials, rows.reset_index(), people=GAIT.person, frame_rate=100)
     assert list(found) == ["mean", "sd", "n"]

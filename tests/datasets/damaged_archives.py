@@ -1,4 +1,4 @@
-"""Small archives of performances, and damage to what is in them."""
+"""Small archives of trials, and damage to what is in them."""
 
 import io
 import re

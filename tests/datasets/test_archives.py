@@ -1,4 +1,4 @@
-"""load_performances: valid archives, and every fault with its message."""
+"""load_trials: valid archives, and every fault with its message."""
 
 import struct
 import tracemalloc
@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 from sklearn_motionsync import Skeleton
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 
 import fuzz_readers
 from damaged_archives import archive, fields, make_archives, npy
@@ -23,7 +23,7 @@ def replaced(name, place, value, dtype=None):
 def test_archive_becomes_a_bunch(tmp_path):
     content = fields()
     np.savez(tmp_path / "a.npz", **content)
-    bunch = load_performances(str(tmp_path / "a.npz"))
+    bunch = load_trials(str(tmp_path / "a.npz"))
     assert [x.shape for x in bunch.data] == [(5, 60), (7, 60)]
     assert bunch.data[0].dtype == np.float32
     np.testing.assert_array_equal(bunch.data[1], content["positions"][5:].reshape(7, 60))
@@ -32,7 +32,7 @@ def test_archive_becomes_a_bunch(tmp_path):
     assert bunch.skeleton == Skeleton.kinect()
     np.testing.assert_array_equal(bunch.frame_rate, [30, np.nan])
     np.savez(tmp_path / "a.npz", **content | {"joints": [f"m{i}" for i in range(20)]})
-    assert load_performances(tmp_path / "a.npz").skeleton is None
+    assert load_trials(tmp_path / "a.npz").skeleton is None
 
 
 def test_compression_order_and_types_do_not_matter(tmp_path):
@@ -46,7 +46,7 @@ def test_compression_order_and_types_do_not_matter(tmp_path):
         "fps": [30, 25],
     }
     np.savez_compressed(tmp_path / "a.npz", **other)
-    bunch = load_performances(tmp_path / "a.npz")
+    bunch = load_trials(tmp_path / "a.npz")
     assert bunch.data[1].dtype == np.float32
     np.testing.assert_array_equal(bunch.data[1], content["positions"][5:].reshape(7, 60))
     bunch.data[1][0] = 0  # it can be written to
@@ -63,7 +63,7 @@ def test_compression_order_and_types_do_not_matter(tmp_path):
         ({"positions": np.zeros((12, 20, 3), int)}, "must be floats"),
         ({"positions": np.zeros((12, 0, 3))}, r"must be floats of shape .*\(12, 0, 3\)"),
         ({"offsets": [0, 5, 11]}, "offsets must increase from 0 to the 12 frames"),
-        ({"offsets": [0, 11, 12]}, "by at least 2 for each performance"),
+        ({"offsets": [0, 11, 12]}, "by at least 2 for each trial"),
         ({"offsets": [0, -3, 12]}, "offsets must increase"),
         ({"offsets": [0.0, 5.0, 12.0]}, "whole numbers"),
         # Differences of unsigned numbers are never negative.
@@ -73,9 +73,9 @@ def test_compression_order_and_types_do_not_matter(tmp_path):
         ({"label": np.array([{}, {}], dtype=object)}, "cannot be read as a NumPy .npz archive"),
         (
             replaced("positions", (7, 0, 1), np.nan),
-            r"performance 1, frame 2, .*HipCenter_y'\) is N",
+            r"trial 1, frame 2, .*HipCenter_y'\) is N",
         ),
-        (replaced("positions", (7, 0, 1), -np.inf), "performance 1, frame 2, .* is infinity"),
+        (replaced("positions", (7, 0, 1), -np.inf), "trial 1, frame 2, .* is infinity"),
         *(
             (replaced("parents", 1, parent, float), "parents must be indices of joints, whole num")
             for parent in (0.5, np.nan, 20, -2, 2**40)
@@ -101,25 +101,25 @@ def test_wrong_fields_are_refused(tmp_path, change, message):
     content = {k: v for k, v in (fields() | change).items() if v is not None}
     np.savez(tmp_path / "a.npz", **content)
     with pytest.raises(ValueError, match=rf"a\.npz.* {message}|a\.npz {message}") as caught:
-        load_performances(tmp_path / "a.npz")
+        load_trials(tmp_path / "a.npz")
     assert str(caught.value).startswith(str(tmp_path))
 
 
 def test_other_files_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match="no archive at"):
-        load_performances(tmp_path / "a.npz")
+        load_trials(tmp_path / "a.npz")
     for content in (b"", b"text", b"PK\x03\x04 and then nothing", npy(np.zeros(3))):
         (tmp_path / "a.npz").write_bytes(content)
         with pytest.raises(ValueError, match=r"cannot be read as a NumPy \.npz archive"):
-            load_performances(tmp_path / "a.npz")
+            load_trials(tmp_path / "a.npz")
 
 
 def test_real_archives_have_skeletons(real_data):
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     assert len(bunch.data) == len(bunch.target) == 132
     assert bunch.skeleton == Skeleton.acclaim()
     for name in ("utkinect", "cmu07_walk"):
-        assert load_performances(real_data / name / f"{name}_positions.npz").skeleton is not None
+        assert load_trials(real_data / name / f"{name}_positions.npz").skeleton is not None
 
 
 # -- damaged archives -------------------------------------------------------------------
@@ -139,7 +139,7 @@ HEADERS = [
 def test_wrong_headers_are_refused(tmp_path, header):
     path = archive(tmp_path / "a.npz", positions=npy(fields()["positions"], header))
     with pytest.raises(ValueError, match=r"a\.npz") as caught:
-        load_performances(path)
+        load_trials(path)
     assert type(caught.value) is ValueError
     assert str(caught.value).startswith(str(path))
     assert len(str(caught.value)) < 500 + len(str(path))
@@ -160,7 +160,7 @@ def test_archives_that_unpack_to_very_much_are_refused_before(tmp_path):
     message = r"a\.npz: the arrays would take 92 MB, from a file of 0\.\d+ MB\. No recording grows"
     tracemalloc.start()
     with pytest.raises(ValueError, match=message):
-        load_performances(path)
+        load_trials(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 10**7
@@ -170,7 +170,7 @@ def test_archives_that_unpack_to_very_much_are_refused_before(tmp_path):
     at = content.rindex(size)
     path.write_bytes(content[:at] + struct.pack("<I", 5000) + content[at + 4 :])
     with pytest.raises(ValueError, match=r"a\.npz cannot be read as a NumPy \.npz archive"):
-        load_performances(path)
+        load_trials(path)
 
 
 def test_damaged_archives_are_read_or_refused(tmp_path):

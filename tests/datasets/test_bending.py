@@ -63,7 +63,7 @@ def test_warp_bounds_the_rates_and_n_actors_counts_the_actors():
     assert make_bending(1, n_frames=40, random_state=0).data[0].shape[0] <= 50
 
 
-def test_random_state_makes_performances_reproducible():
+def test_random_state_makes_trials_reproducible():
     a, b, c = (make_bending(2, random_state=seed) for seed in (0, 0, 1))
     np.testing.assert_array_equal(a.data[1], b.data[1])
     assert a.data[1].shape != c.data[1].shape or not np.allclose(a.data[1], c.data[1])
@@ -72,7 +72,7 @@ def test_random_state_makes_performances_reproducible():
 @pytest.mark.parametrize(
     "params",
     [
-        *({"n_performances": value} for value in (0, 2.0)),
+        *({"n_trials": value} for value in (0, 2.0)),
         {"n_frames": 3},
         {"n_actors": 10**12},
         *({"style": value} for value in (np.nan, -1)),
@@ -88,7 +88,7 @@ def test_parameters_out_of_range_are_refused(params):
 
 
 @pytest.mark.parametrize("params", [{"warp": 10}, {"noise": 1000}, {"style": 100}], ids=str)
-def test_largest_parameters_give_finite_performances(params):
+def test_largest_parameters_give_finite_trials(params):
     bunch = make_bending(4, n_frames=400, random_state=0, **params)
     for x, times, keyframes in zip(bunch.data, bunch.times, bunch.keyframes, strict=True):
         assert np.isfinite(x).all()

@@ -98,7 +98,7 @@ def test_timing_delays_toe_off_of_group_b():
     assert [len(x) for x in same.data] == [len(x) for x in later.data]
 
 
-def test_timing_keeps_postures_and_amplitude_keeps_times():
+def test_timing_keeps_poses_and_amplitude_keeps_times():
     plain, later, larger = (
         make_gait(4, noise=0, random_state=0, **params)
         for params in ({}, {"timing": 6}, {"amplitude": 15})

@@ -69,7 +69,7 @@ def test_any_part_is_drawn_and_animated(joints, axes):
     assert len(bones_drawn(display, 0)) == 6 * n_bones
     for first in (DirectionCosines, JointPositions):
         pipe = make_pipeline(first(skeleton), DenseSynchronizer(30)).fit(X)
-        display = SkeletonDisplay.from_estimator(pipe, X, performances=[0, 1, 2])
+        display = SkeletonDisplay.from_estimator(pipe, X, trials=[0, 1, 2])
         assert display.scenes[1][0].shape == (30, len(skeleton.joints), len(axes))
         display.plot(at=0.7)
         assert len(bones_drawn(display, 1)) == 3 * n_bones
@@ -88,9 +88,7 @@ def test_model_and_departures_of_any_part(joints, axes):
     assert np.isfinite(mean).all()
     still = np.repeat(X[0].to_numpy()[:1], 40, axis=0)
     still = pd.DataFrame(still, columns=X[0].columns)
-    display = SkeletonDisplay.from_departures(
-        pipe, [X[1], still], performance=1, frames=3, limit=0.5
-    )
+    display = SkeletonDisplay.from_departures(pipe, [X[1], still], trial=1, frames=3, limit=0.5)
     assert display.skeleton == skeleton
     marked = {skeleton.joints[joint] for of_panel in display.marked for _, joint in of_panel}
     assert marked & {"left_knee", "left_ankle", "left_hip", "neck", "left_elbow"}
@@ -188,7 +186,7 @@ def test_points_without_a_skeleton_have_two_or_three_axes():
     display = SkeletonDisplay.from_positions(x[:, :8], None, frames=[1])
     assert display.scenes[0][0].shape == (1, 4, 2)
     match = Match(np.linspace(0, 5, 6)[np.newaxis])
-    display = SkeletonDisplay.from_performances([x[:, :8]], None, match=match)
+    display = SkeletonDisplay.from_trials([x[:, :8]], None, match=match)
     assert display.scenes[1][0].shape == (6, 4, 2)
     with pytest.raises(ValueError, match=r"positions of joints are \(n_frames, 3 \* n_joints\)"):
         SkeletonDisplay.from_positions(x[:, :7], None)

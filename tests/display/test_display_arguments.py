@@ -79,14 +79,14 @@ def draw_synchronization(**arguments):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"X": []}, "Found 0 performances"),
-        ({"X": X[0]}, r"single 2-D input\. Wrap one performance as \[X\]"),
-        ({"X": [*X[:3], masked(X[3])]}, "Performance 3 has masked values"),
-        ({"X": [*X[:3], with_one(X[3], np.inf)]}, "Performance 3, frame 3, feature 1 is infinity"),
-        ({"match": TIMES[:2]}, r"each of the 4 performances; got \(2, 10\)"),
+        ({"X": []}, "Found 0 trials"),
+        ({"X": X[0]}, r"single 2-D input\. Wrap one trial as \[X\]"),
+        ({"X": [*X[:3], masked(X[3])]}, "Trial 3 has masked values"),
+        ({"X": [*X[:3], with_one(X[3], np.inf)]}, "Trial 3, frame 3, feature 1 is infinity"),
+        ({"match": TIMES[:2]}, r"each of the 4 trials; got \(2, 10\)"),
         ({"match": TIMES + 1}, "times must be from 0 to P - 1 = 9"),
         ({"match": BACKWARDS}, "times"),
-        ({"match": Match(TIMES[:2])}, "2 matched performances, but 4"),
+        ({"match": Match(TIMES[:2])}, "2 matched trials, but 4"),
         *(({"features": bad}, "There is no feature .*there are 3: x0, x1, x2")
           for bad in (3, -1, 1.5, True, "knee", [0, "x3"])),
         ({"features": []}, "at least one feature"),
@@ -142,12 +142,10 @@ def test_unknown_feature_is_refused(pipe, draw):
     refuses(lambda: draw(pipe, features=[]), "at least one feature")
 
 
-@pytest.mark.parametrize("performance", [4, -1, 1.5, "1", None])
-def test_trellis_refuses_unknown_performance(pipe, performance):
-    message = "is out of range: there are 4 performances"
-    refuses(
-        lambda: TrellisDisplay.from_estimator(pipe, POSITIONS, performance=performance), message
-    )
+@pytest.mark.parametrize("trial", [4, -1, 1.5, "1", None])
+def test_trellis_refuses_unknown_trial(pipe, trial):
+    message = "is out of range: there are 4 trials"
+    refuses(lambda: TrellisDisplay.from_estimator(pipe, POSITIONS, trial=trial), message)
 
 
 def test_every_display_is_drawn_of_an_estimator_but_those_of_a_comparison_and_of_gait():
@@ -157,12 +155,12 @@ def test_every_display_is_drawn_of_an_estimator_but_those_of_a_comparison_and_of
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_from_estimator_refuses_other_and_unfitted_estimators(name):
     from_estimator = getattr(display, name).from_estimator
-    performances = [] if name == "MetricDisplay" else [POSITIONS]
+    trials = [] if name == "MetricDisplay" else [POSITIONS]
     if name != "SearchDisplay":
-        refuses(lambda: from_estimator(3, *performances), "got int|There is no .* in int")
+        refuses(lambda: from_estimator(3, *trials), "got int|There is no .* in int")
     if ESTIMATORS[name] is not None:
         with pytest.raises(NotFittedError):
-            from_estimator(ESTIMATORS[name], *performances)
+            from_estimator(ESTIMATORS[name], *trials)
 
 
 # -- stick figures --------------------------------------------------------------------------
@@ -175,13 +173,13 @@ def draw_positions(x=POSITIONS[0], skeleton=PAPER, **arguments):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"x": []}, "Found 0 performances"),
+        ({"x": []}, "Found 0 trials"),
         ({"x": None}, "got NoneType"),
-        ({"x": "walk.bvh"}, "A set of performances"),
+        ({"x": "walk.bvh"}, "A set of trials"),
         ({"x": POSITIONS[0][:, :6]}, r"15 joints are \(n_frames, 45\)"),
         ({"x": POSITIONS[0][:0]}, r"shape \(0, 45\)"),
-        ({"x": [POSITIONS[0], masked(POSITIONS[1])]}, "Performance 1 has masked values"),
-        ({"x": with_one(POSITIONS[0], np.inf)}, "Performance 0, frame 3, feature 1 is infinity"),
+        ({"x": [POSITIONS[0], masked(POSITIONS[1])]}, "Trial 1 has masked values"),
+        ({"x": with_one(POSITIONS[0], np.inf)}, "Trial 0, frame 3, feature 1 is infinity"),
         ({"x": POSITIONS[0] * np.nan}, "No frame shows the hips"),
         (
             {"x": pd.DataFrame(POSITIONS[0], columns=[NAMES[-1], *NAMES[1:-1], "chest"])},
@@ -204,26 +202,26 @@ def test_from_positions_refuses(arguments, message):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"names": ["a"]}, "names .* each of the 4 performances, got 1"),
+        ({"names": ["a"]}, "names .* each of the 4 trials, got 1"),
         *(
             ({"at": bad}, "at must be a share of the time from 0 to 1, got")
             for bad in (-0.1, 1.5, np.nan)
         ),
-        ({"match": Match(TIMES[:2])}, "2 matched performances, but 4"),
+        ({"match": Match(TIMES[:2])}, "2 matched trials, but 4"),
         ({"skeleton": 15}, "skeleton must be a Skeleton"),
         ({"X": [x[:, :9] for x in POSITIONS]}, "15 joints are"),
     ],
 )
-def test_from_performances_refuses(arguments, message):
+def test_from_trials_refuses(arguments, message):
     arguments = {"X": POSITIONS, "match": Match(TIMES), "skeleton": PAPER} | arguments
-    refuses(lambda: SkeletonDisplay.from_performances(**arguments), message)
+    refuses(lambda: SkeletonDisplay.from_trials(**arguments), message)
 
 
-@pytest.mark.parametrize("performances", [[99], [0.5], "01"])
-def test_from_estimator_refuses_unknown_performances(pipe, performances):
+@pytest.mark.parametrize("trials", [[99], [0.5], "01"])
+def test_from_estimator_refuses_unknown_trials(pipe, trials):
     refuses(
-        lambda: SkeletonDisplay.from_estimator(pipe, POSITIONS, performances=performances),
-        "performances must be from 0 to 3, got",
+        lambda: SkeletonDisplay.from_estimator(pipe, POSITIONS, trials=trials),
+        "trials must be from 0 to 3, got",
     )
 
 

@@ -30,13 +30,13 @@ SEEN_BY = {
     ],
 }
 TOGETHER = [
-    ("performance", "pattern"),
-    ("performance", "mean"),
+    ("trial", "pattern"),
+    ("trial", "mean"),
     ("mean", "envelope"),
     ("left", "right"),
     ("left", "middle"),
     ("right", "middle"),
-    *(("departure", other) for other in ("performance", "mean", "envelope", "pattern")),
+    *(("departure", other) for other in ("trial", "mean", "envelope", "pattern")),
     *itertools.combinations(("departure", "quiet", "shadow"), 2),
 ]
 

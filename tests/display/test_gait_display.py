@@ -17,7 +17,7 @@ def walk():
 def test_lines_and_bars_are_at_the_events(walk):
     shown = GaitDisplay.from_positions(walk.data, walk.skeleton, recording=1, frame_rate=100)
     events = gait_events(walk.data, walk.skeleton, frame_rate=100)
-    own = events[events["performance"] == 1]
+    own = events[events["trial"] == 1]
     for axis, context in zip(shown.axes_, ("Left", "Right"), strict=False):
         times = sorted(line.get_xdata()[0] for line in axis.lines[2:])
         np.testing.assert_allclose(times, own[own["context"] == context]["time"])

@@ -189,7 +189,7 @@ def test_signals_are_what_reaches_an_aspace():
         ({"ylabel": ["a"]}, "ylabel must be a list of text, one for each of the 4 signals"),
         ({"units": {"elbow": "deg"}}, "units: there is no signal 'elbow'; there are hip_flexion"),
         ({"unit": "seconds"}, "frame_rate"),
-        ({"signals": TRIALS[:3]}, "one sequence for each of 28 performances, got 3"),
+        ({"signals": TRIALS[:3]}, "one sequence for each of 28 trials, got 3"),
         ({"events": np.ones((3, 1))}, "events must be a list of 28 arrays"),
         ({"groups": ["A"]}, "groups must have one label"),
     ],

@@ -27,7 +27,7 @@ def places(lines):
 
 
 def texts(axis):
-    return [text.get_text() for text in axis.texts if "template" not in text.get_text()]
+    return [text.get_text() for text in axis.texts if "pattern" not in text.get_text()]
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_the_model_of_a_pipeline_shows_them(sync):
 
 
 def test_the_warp_of_the_trellis_goes_through_them(sync):
-    display = TrellisDisplay.from_estimator(sync, X, performance=2, keyframes=K)
+    display = TrellisDisplay.from_estimator(sync, X, trial=2, keyframes=K)
     at = K.iloc[2] * 60 / (LENGTHS[2] - 1)
     met = np.interp(at, np.arange(61) + display.warp, np.arange(61))
     np.testing.assert_allclose(met, sync.keyframes_, atol=1e-6)

@@ -14,7 +14,7 @@ N_FRAMES = 21
 
 @pytest.fixture(scope="module")
 def lags():
-    """Twelve performances of four subjects; the arm is late in the second half, the leg never."""
+    """Twelve trials of four subjects; the arm is late in the second half, the leg never."""
     rng, groups = np.random.default_rng(0), np.repeat(range(4), 3)
     values = rng.normal(0, 0.3, (12, 2, N_FRAMES))
     values[:, 0, 11:] += 5
@@ -55,7 +55,7 @@ def test_curves_show_mean_interval_and_standard_deviation(lags):
     assert "people" in display.axes_[1].get_legend().get_texts()[1].get_text()
 
 
-def test_a_single_performance_has_no_interval(lags):
+def test_a_single_trial_has_no_interval(lags):
     display = LagDisplay.from_predictions(Lags(lags.values[:1], lags.parts, "percent"))
     assert display.axes_[0].get_title() == "2 parts behind the rest of the body, 1 trial"
     assert display.unsure_[0].get_paths()

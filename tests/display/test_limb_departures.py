@@ -132,17 +132,15 @@ def marked_joints(display, panel):
 def test_standing_still_departs_from_bending(bunch, pipe):
     still = np.repeat(bunch.data[0][:1], 40, axis=0)
     people = [bunch.data[3], still]
-    good, bad = (
-        SkeletonDisplay.from_departures(pipe, people, performance=i, frames=3) for i in (0, 1)
-    )
+    good, bad = (SkeletonDisplay.from_departures(pipe, people, trial=i, frames=3) for i in (0, 1))
     assert good.heading_.get_text().startswith("Trial 0 is accepted.")
     assert bad.heading_.get_text().startswith("Trial 1 is not accepted.")
     assert sum(map(len, good.marked)) < 3 < sum(map(len, bad.marked))
     assert "neck" in marked_joints(bad, 1), "the torso"
-    # The whole posture is drawn, with what the aSpace leaves out, and the mean at the frame.
-    postures = Match.from_estimator(pipe, people).warp(pipe[0].transform(people))[1]
+    # The whole pose is drawn, with what the aSpace leaves out, and the mean at the frame.
+    poses = Match.from_estimator(pipe, people).warp(pipe[0].transform(people))[1]
     mean = pipe[1].inverse_transform([pipe[-1].mean_])[0]
-    for x, scenes in ((postures, bad.scenes), (mean, bad.behind)):
+    for x, scenes in ((poses, bad.scenes), (mean, bad.behind)):
         bodies = pipe[0].inverse_transform([x])[0].reshape(40, 15, 3)
         for title, scene in zip(bad.titles, scenes, strict=True):
             frame = int(title.split("\n")[0].removeprefix("frame "))
@@ -153,8 +151,8 @@ def test_titles_agree_with_find_departures(bunch, pipe):
     people = [bunch.data[0][::-1], bunch.data[1]]
     for i, limit in ((0, None), (1, 0.1)):
         table = find_departures(pipe, people, limit=limit)
-        worst = table[table.performance == i].iloc[0]
-        display = SkeletonDisplay.from_departures(pipe, people, performance=i, limit=limit)
+        worst = table[table.trial == i].iloc[0]
+        display = SkeletonDisplay.from_departures(pipe, people, trial=i, limit=limit)
         at = [title for title in display.titles if title.startswith(f"frame {worst.peak}\n")]
         assert len(at) == 1
         assert at[0].split("\n")[1].startswith(f"{worst.limb.replace('_', ' ')} ")
@@ -182,7 +180,7 @@ def test_a_reference_is_what_is_expected(bunch, pipe):
     assert (first.limb, first.rare) == ("left_forearm", True)
     assert np.linalg.norm(body - of_person, axis=1).max() < 0.3
     assert np.linalg.norm(body - others, axis=1).max() > 0.2
-    # One performance helps, three help more.
+    # One trial helps, three help more.
     sizes = [first["size"]]
     for n in (1, 3):
         table = find_departures(pipe, own[3:4], reference=own[:n], limit=1e-3)
@@ -200,7 +198,7 @@ def test_tables_and_key_frames_are_accepted(bunch):
             steps[2].set_fit_request(keyframes=True).set_transform_request(keyframes=True)
             pipe = make_pipeline(*map(clone, steps)).set_output(transform=output)
             pipe.fit(X, keyframes=bunch.keyframes)
-        given = {"performance": 2, "limit": 1, "keyframes": bunch.keyframes}
+        given = {"trial": 2, "limit": 1, "keyframes": bunch.keyframes}
         drawn.append(SkeletonDisplay.from_departures(pipe, X, **given))
     one, other = drawn
     assert other.heading.startswith("Trial 2 ('c') is accepted.")
@@ -233,9 +231,9 @@ def test_a_pipeline_without_aspace_on_axes_of_the_user(bunch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        *(({"performance": bad}, "performance must be from 0 to 7, got")
+        *(({"trial": bad}, "trial must be from 0 to 7, got")
           for bad in (8, -1, 1.5, True)),
-        *(({"performance": bad}, "performance must be one number from 0 to 7")
+        *(({"trial": bad}, "trial must be one number from 0 to 7")
           for bad in ("0", None, [0])),
         *(({"limit": bad}, "limit must be a number of standard deviations above 0, or None; got")
           for bad in (0, -1, np.nan)),
@@ -255,7 +253,7 @@ def test_from_departures_refuses_pipelines_without_limbs(bunch, pipe):
         SkeletonDisplay.from_departures(alone, points)
     with pytest.raises(ValueError, match="no ActionModel in Pipeline"):
         SkeletonDisplay.from_departures(pipe[:3], bunch.data)
-    with pytest.raises(ValueError, match="from_departures needs performances X"):
+    with pytest.raises(ValueError, match="from_departures needs trials X"):
         SkeletonDisplay.from_departures(pipe, None)
     double = FunctionTransformer(lambda X: [2 * x for x in X])
     steps = *pipe[:2], double, LinearSynchronizer(20), ActionModel()
@@ -276,7 +274,5 @@ def test_heading_tells_departures_outside_the_aspace(bunch):
     assert "neck" in display.titles[0]
     assert find_departures(pipe, [tilted.reshape(-1, 45)]).rare.any()
     assert "is accepted: the model sees what the aSpace keeps," in display.heading
-    plain = SkeletonDisplay.from_departures(
-        pipe, [tilted.reshape(-1, 45), bunch.data[3]], performance=1
-    )
+    plain = SkeletonDisplay.from_departures(pipe, [tilted.reshape(-1, 45), bunch.data[3]], trial=1)
     assert "Trial 1 is accepted.\n" in plain.heading

@@ -10,14 +10,14 @@ from sklearn_motionsync.display import MetricDisplay
 
 BUNCH = make_bending(6, n_frames=60, random_state=1)
 COSINES = DirectionCosines(BUNCH.skeleton)
-POSTURES = COSINES.fit_transform(BUNCH.data)
-# The standard deviation of noise: twice the typical one of the postures.
-NOISE = 2 * np.concatenate(POSTURES).std(axis=0).mean()
+POSES = COSINES.fit_transform(BUNCH.data)
+# The standard deviation of noise: twice the typical one of the poses.
+NOISE = 2 * np.concatenate(POSES).std(axis=0).mean()
 
 
 def with_noise(columns=slice(None)):
     rng = np.random.default_rng(0)
-    return [np.column_stack([x[:, columns], NOISE * rng.normal(size=len(x))]) for x in POSTURES]
+    return [np.column_stack([x[:, columns], NOISE * rng.normal(size=len(x))]) for x in POSES]
 
 
 @pytest.fixture(scope="module")
@@ -98,12 +98,12 @@ STILL = [np.ones((40, 2))] * 4
 @pytest.mark.parametrize(
     ("change", "X", "message"),
     [
-        ({"metric": None}, POSTURES, "It has metric=None, cost='velocity', consensus=8"),
-        ({"cost": "elastic"}, POSTURES, "It has metric='learned', cost='elastic', consensus=8"),
-        ({"consensus": 0}, POSTURES, "It has metric='learned', cost='velocity', consensus=0"),
-        ({}, POSTURES[:2], "at least 3 performances .* was fitted to 2 performances; change"),
-        ({}, POSTURES[:1], "was fitted to 1 performance; change what is missing and fit it again"),
-        ({}, STILL, "in which something moves.* was fitted to 4 performances"),
+        ({"metric": None}, POSES, "It has metric=None, cost='velocity', consensus=8"),
+        ({"cost": "elastic"}, POSES, "It has metric='learned', cost='elastic', consensus=8"),
+        ({"consensus": 0}, POSES, "It has metric='learned', cost='velocity', consensus=0"),
+        ({}, POSES[:2], "at least 3 trials .* was fitted to 2 trials; change"),
+        ({}, POSES[:1], "was fitted to 1 trial; change what is missing and fit it again"),
+        ({}, STILL, "in which something moves.* was fitted to 4 trials"),
     ],
 )
 def test_missing_metric_is_explained(change, X, message):

@@ -20,7 +20,7 @@ from sklearn_motionsync.display.base import group_styles
 P = 30
 
 
-def test_mean_envelope_and_performances(bunch, pipe):
+def test_mean_envelope_and_trials(bunch, pipe):
     display = ActionModelDisplay.from_estimator(
         pipe, bunch.data, features=["aspace1", 0], band="points"
     )
@@ -34,26 +34,26 @@ def test_mean_envelope_and_performances(bunch, pipe):
             heights = corners[corners[:, 0] == p, 1]
             np.testing.assert_allclose(heights.min(), lower[p, feature])
             np.testing.assert_allclose(heights.max(), upper[p, feature])
-        np.testing.assert_array_equal(ys(display.performances_[i]), warped[:, :, feature])
+        np.testing.assert_array_equal(ys(display.trials_[i]), warped[:, :, feature])
     assert {"mean ± 3 standard deviations", "9 trials"} < set(texts(display.axes_[0]))
 
 
-def test_model_in_features_of_postures(bunch, pipe):
+def test_model_in_features_of_poses(bunch, pipe):
     display = ActionModelDisplay.from_estimator(pipe, features=["left_leg_y", "pelvis_height"])
     names = list(pipe[0].get_feature_names_out())
     chosen = [names.index("left_leg_y"), names.index("pelvis_height")]
-    postures = pipe[1].inverse_transform(pipe[-1].mean_)[:, chosen]
-    np.testing.assert_allclose(display.mean, postures, atol=1e-12)
-    assert display.performances_ == display.departures_ == []
-    # The variance is that of postures: dimensions of the aSpace are correlated.
-    postures = pipe[1].inverse_transform(pipe[:3].transform(bunch.data))[:, :, chosen]
-    std = postures.std(axis=0)
+    poses = pipe[1].inverse_transform(pipe[-1].mean_)[:, chosen]
+    np.testing.assert_allclose(display.mean, poses, atol=1e-12)
+    assert display.trials_ == display.departures_ == []
+    # The variance is that of poses: dimensions of the aSpace are correlated.
+    poses = pipe[1].inverse_transform(pipe[:3].transform(bunch.data))[:, :, chosen]
+    std = poses.std(axis=0)
     np.testing.assert_allclose(display.upper - display.mean, 3 * std, atol=1e-9)
     np.testing.assert_allclose(display.mean - display.lower, 3 * std, atol=1e-9)
 
 
 def legend_of(display):
-    """The title of the legend, its first label, and the number of performances that leave."""
+    """The title of the legend, its first label, and the number of trials that leave."""
     labels = texts(display.axes_[0])
     outside = [
         int(label.split(": ")[1].split()[0])
@@ -68,7 +68,7 @@ def test_each_band_has_its_bounds_and_legend(bunch, pipe):
     factor = model.simultaneous_factor()
     expected = {
         "points": (model.envelope(), "single poses", "mean ± 2 standard deviations"),
-        "performances": (
+        "trials": (
             model.envelope(simultaneous=True),
             "90 % of new people's trials",
             f"mean ± {factor:.3g} predicted standard deviations",
@@ -89,38 +89,38 @@ def test_each_band_has_its_bounds_and_legend(bunch, pipe):
     for features in ("torso_z", "aspace0"):
         wide, narrow = (
             ActionModelDisplay.from_estimator(pipe, features=features, band=band)
-            for band in ("performances", "mean")
+            for band in ("trials", "mean")
         )
         assert (wide.upper > narrow.upper).all()
         assert (wide.lower < narrow.lower).all()
 
 
-@pytest.mark.parametrize("band", ["points", "performances"])
+@pytest.mark.parametrize("band", ["points", "trials"])
 def test_departures_are_the_parts_outside_the_band(bunch, pipe, band):
     still = np.repeat(bunch.data[0][:1], 40, axis=0)
     people, features = [*bunch.data[:3], still], ["pelvis_height", "torso_z"]
     display = ActionModelDisplay.from_estimator(pipe, people, features=features, band=band)
-    outside = (display.performances < display.lower) | (display.performances > display.upper)
+    outside = (display.trials < display.lower) | (display.trials > display.upper)
     assert outside[3].any()
     assert legend_of(display)[2] == outside.any(axis=(1, 2)).sum()
     for i, departures in enumerate(display.departures_):
-        assert tuple(departures.get_colors()[0]) != tuple(display.performances_[i].get_colors()[0])
+        assert tuple(departures.get_colors()[0]) != tuple(display.trials_[i].get_colors()[0])
         pieces = {(x, y) for piece in segments(departures) for x, y in piece.round(9) if x % 1 == 0}
         seen = np.argwhere(outside[:, :, i])
-        assert pieces == {(p, display.performances[n, p, i].round(9)) for n, p in seen}
+        assert pieces == {(p, display.trials[n, p, i].round(9)) for n, p in seen}
     assert ActionModelDisplay.from_estimator(pipe, people, band="mean").departures_ == []
 
 
 def test_rounding_is_no_departure():
-    """Performances do not differ in a feature, except by rounding."""
+    """Trials do not differ in a feature, except by rounding."""
     X = np.tile(np.random.default_rng(0).normal(size=(9, 2)), (3, 1, 1)).astype(np.float32)
     X[:, :, 0] += np.array([0, 0.1, 0.3], dtype=np.float32)[:, np.newaxis]
-    for band in ("points", "performances"):
+    for band in ("points", "trials"):
         display = ActionModelDisplay.from_estimator(ActionModel().fit(X), X, band=band)
         assert legend_of(display)[2] == 0
 
 
-def test_features_of_postures_need_an_invertible_pipeline(bunch):
+def test_features_of_poses_need_an_invertible_pipeline(bunch):
     double = FunctionTransformer(lambda X: [2 * x for x in X])
     steps = DirectionCosines(bunch.skeleton), ASpace(3), double, DenseSynchronizer(20)
     pipe = make_pipeline(*steps, ActionModel()).fit(bunch.data)
@@ -133,7 +133,7 @@ def test_model_without_a_pipeline(bunch, pipe):
     model = ActionModel(n_std=2).fit(warped)
     display = ActionModelDisplay.from_estimator(model, warped[:2])
     assert display.ylabels == ["x0", "x1", "x2"]
-    assert display.performances.shape == (2, 30, 3)
+    assert display.trials.shape == (2, 30, 3)
     with pytest.raises(ValueError, match="no feature 'pelvis_height'"):
         ActionModelDisplay.from_estimator(model, features="pelvis_height")
     with pytest.raises(ValueError, match="no feature 'knee'; there are 37: pelvis_height"):
@@ -145,7 +145,7 @@ def test_model_without_a_pipeline(bunch, pipe):
     [
         ({"band": "all"}, ValueError, "band must be one of .*got 'all'"),
         ({"band": ["mean"]}, ValueError, "band must be one of"),
-        ({"keyframes": [[3]], "X": None}, TypeError, "takes keyframes along with performances X"),
+        ({"keyframes": [[3]], "X": None}, TypeError, "takes keyframes along with trials X"),
         ({"unit": "ms"}, ValueError, "unit must be one of .*got 'ms'"),
         ({"unit": "seconds"}, ValueError, "needs frame_rate"),
         ({"unit": "seconds", "frame_rate": 0}, ValueError, "frame_rate must be one number above"),
@@ -182,10 +182,10 @@ def test_units_of_the_action_model_display(bunch, pipe):
             pipe, X, features=[0], unit=unit, frame_rate=50, band="points"
         )
         np.testing.assert_allclose(display.mean_[0].get_xdata(), np.linspace(0, last, P))
-        for artist in (*display.performances_, *display.departures_):
+        for artist in (*display.trials_, *display.departures_):
             for path in artist.get_paths():
                 assert path.vertices[:, 0].max() <= last * (1 + 1e-9)
-    # Without performances the frame rate is that of the clock.
+    # Without trials the frame rate is that of the clock.
     display = ActionModelDisplay.from_estimator(pipe, features=[0], unit="seconds", frame_rate=10)
     np.testing.assert_allclose(display.mean_[0].get_xdata(), np.arange(P) / 10)
 

@@ -98,7 +98,7 @@ def test_other_frames_and_animation(live, display):
     axes, shown = display.axes_, display.rows_[0]
     assert display.plot(axes, frame=0).axes_ == axes
     assert [row.dial.share.get_text() for row in display.rows_] == ["0 %", "0 %"]
-    # In the last frame the shorter performance has ended.
+    # In the last frame the shorter trial has ended.
     display.plot(axes)
     times = [row.phase.get_xdata()[-1] for row in display.rows_]
     np.testing.assert_allclose(times, [(len(x) - 1) / RATE for x in X[6:]])
@@ -127,7 +127,7 @@ def test_unknown_values_are_not_drawn(live):
     for frames in zip(X[6], X[7], strict=False):
         live.step(frames)
     streams = PhaseDisplay.from_predictions(live.history, live.n_frames_)
-    assert repr(streams) == "PhaseDisplay(2 performances)"
+    assert repr(streams) == "PhaseDisplay(2 trials)"
     live.reset()
     table = pd.concat([pd.DataFrame(x) for x in X], keys=list("abcdefgh"))
     rows = PhaseDisplay.from_estimator(live, table).rows_
@@ -166,7 +166,7 @@ def test_titles_and_predictions_fit_into_the_figure(live):
     extent = row.axes[0].title.get_window_extent()
     assert extent.x0 >= 0
     assert extent.y1 <= display.figure_.bbox.y1
-    # A performance that has stopped is expected to need half of the remaining time.
+    # A trial that has stopped is expected to need half of the remaining time.
     stops = LivePhase(np.full(90, 25), np.zeros(90), np.ones(90))
     (row,) = PhaseDisplay.from_predictions(stops, 51, duration=60).rows_
     assert row.rest.get_xdata()[-1] == 89 + 15
@@ -227,12 +227,12 @@ def test_from_estimator_refuses(live):
         ({"frame": 900}, "frame must be from 0 to"),
         ({"frame": [1, 2]}, "frame must be one number from 0 to"),
         ({"times": [np.arange(3)]}, "times"),
-        ({"times": [np.arange(3)] * 8}, "Performance 0: times must be one a"),
+        ({"times": [np.arange(3)] * 8}, "Trial 0: times must be one a"),
         ({"names": ["one"]}, "names must be a list of text"),
     ):
         with pytest.raises(ValueError, match=message):
             PhaseDisplay.from_estimator(live, X, **change)
-    with pytest.raises(ValueError, match="Found 0 performances"):
+    with pytest.raises(ValueError, match="Found 0 trials"):
         PhaseDisplay.from_estimator(live, [])
     with pytest.raises(ValueError, match="phases must be a LivePhase"):
         PhaseDisplay.from_predictions([1], 50)

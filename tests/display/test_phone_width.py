@@ -32,24 +32,24 @@ def pipe():
 
 
 @pytest.fixture(scope="module")
-def postures(pipe):
+def poses(pipe):
     return pipe[0].transform(BUNCH.data)
 
 
-def norm(pipe, postures):
+def norm(pipe, poses):
     groups = ["norm"] * 6 + ["new"] * 2
     found = compare_to_norm(pipe, BUNCH.data, groups, norm="norm")
     return display.NormDisplay.from_comparison(found, 6)
 
 
-def search(pipe, postures):
-    takes = [np.concatenate([postures[0]] * 3), postures[1]]
-    model = make_pipeline(*pipe[1:]).fit(postures)
-    segments = [(0, 0, len(postures[0]))]
+def search(pipe, poses):
+    takes = [np.concatenate([poses[0]] * 3), poses[1]]
+    model = make_pipeline(*pipe[1:]).fit(poses)
+    segments = [(0, 0, len(poses[0]))]
     return display.SearchDisplay.from_estimator(model, takes, segments=segments)
 
 
-def cycles(pipe, postures):
+def cycles(pipe, poses):
     gait = make_gait(3, n_cycles=4, takes=True, random_state=0)
     segmenter = CycleSegmenter(start=0).fit(gait.data)
     return display.CycleDisplay.from_estimator(
@@ -57,65 +57,63 @@ def cycles(pipe, postures):
     )
 
 
-def phases(pipe, postures):
-    live = OnlineSynchronizer(frame_rate=50).fit(postures)
+def phases(pipe, poses):
+    live = OnlineSynchronizer(frame_rate=50).fit(poses)
     features = ["torso_y", "left_forearm_z"]
     return display.PhaseDisplay.from_estimator(
-        live, postures[:2], training=postures, body=pipe[0], features=features, frame=30
+        live, poses[:2], training=poses, body=pipe[0], features=features, frame=30
     )
 
 
-def tracking(pipe, postures):
-    seen = postures[0].copy()
+def tracking(pipe, poses):
+    seen = poses[0].copy()
     seen[10:25, 6:20] = np.nan
     names = list(pipe[0].get_feature_names_out())
-    tracker = MotionTracker(noise=0.05, random_state=0).fit(postures)
-    return display.TrackingDisplay.from_estimator(tracker, seen, truth=postures[0], names=names)
+    tracker = MotionTracker(noise=0.05, random_state=0).fit(poses)
+    return display.TrackingDisplay.from_estimator(tracker, seen, truth=poses[0], names=names)
 
 
-def tracked_bodies(pipe, postures):
-    return tracking(pipe, postures).strip(pipe[0])
+def tracked_bodies(pipe, poses):
+    return tracking(pipe, poses).strip(pipe[0])
 
 
 DRAWN = {
-    "synchronization": lambda pipe, postures: display.SynchronizationDisplay.from_estimator(
+    "synchronization": lambda pipe, poses: display.SynchronizationDisplay.from_estimator(
         pipe, BUNCH.data, groups=BUNCH.actor
     ),
-    "synchronization in seconds": lambda pipe, postures: (
-        display.SynchronizationDisplay.from_estimator(
-            pipe, BUNCH.data, features=[0], unit="seconds", frame_rate=50
-        )
+    "synchronization in seconds": lambda pipe, poses: display.SynchronizationDisplay.from_estimator(
+        pipe, BUNCH.data, features=[0], unit="seconds", frame_rate=50
     ),
-    "model": lambda pipe, postures: display.ActionModelDisplay.from_estimator(
-        pipe, BUNCH.data, band="performances"
+    "model": lambda pipe, poses: display.ActionModelDisplay.from_estimator(
+        pipe, BUNCH.data, band="trials"
     ),
-    "postures": lambda pipe, postures: display.SkeletonDisplay.from_positions(
+    "poses": lambda pipe, poses: display.SkeletonDisplay.from_positions(
         BUNCH.data[0], BUNCH.skeleton
     ),
-    "postures of a model": lambda pipe, postures: display.SkeletonDisplay.from_model(
+    "poses of a model": lambda pipe, poses: display.SkeletonDisplay.from_model(
         pipe, random_state=0
     ),
-    "departures": lambda pipe, postures: display.SkeletonDisplay.from_departures(
+    "departures": lambda pipe, poses: display.SkeletonDisplay.from_departures(
         pipe, [BUNCH.data[0][::-1]]
     ),
-    "bodies": lambda pipe, postures: display.SkeletonDisplay.from_estimator(pipe, BUNCH.data),
-    "groups": lambda pipe, postures: display.GroupDisplay.from_estimator(
+    "bodies": lambda pipe, poses: display.SkeletonDisplay.from_estimator(pipe, BUNCH.data),
+    "groups": lambda pipe, poses: display.GroupDisplay.from_estimator(
         pipe, BUNCH.data, ["young"] * 4 + ["old"] * 4, units="m", features=range(4)
     ),
-    "lags": lambda pipe, postures: display.LagDisplay.from_estimator(
-        PartSynchronizer(synchronizer=DenseSynchronizer(30)).fit(postures),
-        postures,
+    "lags": lambda pipe, poses: display.LagDisplay.from_estimator(
+        PartSynchronizer(synchronizer=DenseSynchronizer(30)).fit(poses),
+        poses,
         groups=BUNCH.actor,
         unit="percent",
     ),
-    "gait": lambda pipe, postures: display.GaitDisplay.from_positions(
+    "gait": lambda pipe, poses: display.GaitDisplay.from_positions(
         WALK.data, WALK.skeleton, frame_rate=100
     ),
-    "metric": lambda pipe, postures: display.MetricDisplay.from_estimator(
+    "metric": lambda pipe, poses: display.MetricDisplay.from_estimator(
         make_pipeline(*pipe[:1], DenseSynchronizer(30)).fit(BUNCH.data)
     ),
-    "trellis": lambda pipe, postures: display.TrellisDisplay.from_estimator(
-        pipe[:-1], BUNCH.data, performance=1
+    "trellis": lambda pipe, poses: display.TrellisDisplay.from_estimator(
+        pipe[:-1], BUNCH.data, trial=1
     ),
     "norm": norm,
     "search": search,
@@ -127,8 +125,8 @@ DRAWN = {
 
 
 @pytest.mark.parametrize("kind", DRAWN)
-def test_new_figures_are_narrow_and_show_all_their_text(pipe, postures, kind):
-    figure = DRAWN[kind](pipe, postures).figure_
+def test_new_figures_are_narrow_and_show_all_their_text(pipe, poses, kind):
+    figure = DRAWN[kind](pipe, poses).figure_
     figure.canvas.draw()
     assert figure.get_size_inches()[0] <= LARGEST_WIDTH
     axes = [axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)]

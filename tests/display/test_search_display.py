@@ -4,7 +4,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import find_performances, to_sequences
+from sklearn_motionsync import find_trials, to_trials
 from sklearn_motionsync.display import SearchDisplay
 
 matplotlib.use("Agg")
@@ -28,8 +28,8 @@ def test_hits_have_their_times_and_others_are_grey():
 
 def test_each_take_has_a_panel():
     table = pd.concat([pd.DataFrame(TAKE), pd.DataFrame(TAKE[:80])], keys=["ann", "bob"])
-    takes = to_sequences(table.rename_axis(["take", "frame"]))
-    _, origin = find_performances(pd.DataFrame(WAVE), takes)
+    takes = to_trials(table.rename_axis(["take", "frame"]))
+    _, origin = find_trials(pd.DataFrame(WAVE), takes)
     display = SearchDisplay.from_predictions(origin, takes, xlabel="at 50 Hz")
     assert display.axes_[-1].get_xlabel() == "at 50 Hz"
     assert [axis.get_title() for axis in display.axes_] == ["take ann", "take bob"]
@@ -38,7 +38,7 @@ def test_each_take_has_a_panel():
 
 def test_a_search_without_hits_is_drawn():
     still = np.zeros((100, 2))
-    display = SearchDisplay.from_predictions(find_performances(WAVE, still)[1], still)
+    display = SearchDisplay.from_predictions(find_trials(WAVE, still)[1], still)
     assert repr(display) == "SearchDisplay(0 hits in 1 take)"
 
 

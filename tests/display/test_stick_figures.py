@@ -153,7 +153,7 @@ def test_titles_name_the_frames(bunch):
         np.testing.assert_array_equal(bones_drawn(display, panel), bones_drawn(alone, 0))
 
 
-def test_from_model_draws_mean_and_accepted_postures(pipe):
+def test_from_model_draws_mean_and_accepted_poses(pipe):
     display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), n_samples=5, azimuth=0)
     titles = [axis.get_title() for axis in display.axes_]
     assert [title.split("\n")[0] for title in titles] == ["frame 4"] * 2 + ["frame 20"] * 2
@@ -167,7 +167,7 @@ def test_from_model_draws_mean_and_accepted_postures(pipe):
 
 def test_bodies_move_together_after_synchronisation(bunch, pipe):
     display = SkeletonDisplay.from_estimator(pipe, bunch.data)
-    assert display.labels[0] == f"{pipe[2].pattern_index_} (template)"
+    assert display.labels[0] == f"{pipe[2].pattern_index_} (pattern)"
     # Heights of heads relative to the first frame, as bodies differ in size.
     heights, standing = {"raw": [], "synchronised": []}, display.heads_[0].get_ydata()
     for at in np.linspace(0.1, 0.7, 7):
@@ -184,9 +184,9 @@ def test_bodies_move_together_after_synchronisation(bunch, pipe):
 def test_a_match_draws_what_from_estimator_does(bunch, pipe):
     points = pipe[:2].transform(bunch.data)
     times = pipe[2].match(points).times
-    one = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[4, 1])
+    one = SkeletonDisplay.from_estimator(pipe, bunch.data, trials=[4, 1])
     X, match = [bunch.data[4], bunch.data[1]], Match(times[[4, 1]])
-    other = SkeletonDisplay.from_performances(X, bunch.skeleton, match=match, names=["x", "y"])
+    other = SkeletonDisplay.from_trials(X, bunch.skeleton, match=match, names=["x", "y"])
     for at in (0, 0.5, 1):
         one.plot(at=at)
         other.plot(at=at)
@@ -201,14 +201,14 @@ def test_the_view_follows_a_body_that_walks_far(bunch):
     for X in (staying, staying + drift):
         display = SkeletonDisplay.from_positions(X, bunch.skeleton, frames=[0, 30])
         strips.append([bones_drawn(display, panel) for panel in (0, 1)])
-        display = SkeletonDisplay.from_performances([X], bunch.skeleton, at=0.7)
+        display = SkeletonDisplay.from_trials([X], bunch.skeleton, at=0.7)
         moving.append(bones_drawn(display, 0))
     np.testing.assert_allclose(strips[0], strips[1], atol=1e-9)
     middle = np.abs(moving[1][:, :, 0]).max()
     assert middle < 1.5, "six metres away without following"
     # A body that stays is not followed: the feet stand still while the pelvis moves.
     feet = [j for j, name in enumerate(bunch.skeleton.joints) if name.endswith("ankle")]
-    raw = SkeletonDisplay.from_performances([staying], bunch.skeleton).scenes[0][0]
+    raw = SkeletonDisplay.from_trials([staying], bunch.skeleton).scenes[0][0]
     assert np.ptp(raw[:, feet], axis=0).max() < 0.05 < np.ptp(raw[:, 0, [0, 2]], axis=0).max()
 
 
@@ -234,7 +234,7 @@ def test_hidden_joints_are_gaps(bunch):
 
 
 def test_animation_plays_from_the_first_to_the_last_frame(bunch, pipe, monkeypatch):
-    display = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[0, 1])
+    display = SkeletonDisplay.from_estimator(pipe, bunch.data, trials=[0, 1])
     shows = []
 
     def recorded(animation, figure, show, **kwargs):
@@ -261,7 +261,7 @@ def test_animation_plays_from_the_first_to_the_last_frame(bunch, pipe, monkeypat
 
 def test_animation_on_axes_of_the_user(bunch, pipe):
     figure, axes = plt.subplots(2, 1)
-    display = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[0, 1], ax=axes)
+    display = SkeletonDisplay.from_estimator(pipe, bunch.data, trials=[0, 1], ax=axes)
     animation = display.animate(seconds=0.5, fps=4)
     assert display.axes_ == list(axes)
     assert all(len(axis.collections) == 4 for axis in axes), "the still figures are still there"
@@ -274,28 +274,28 @@ def test_pipelines_without_a_model_are_refused(pipe):
         SkeletonDisplay.from_model(pipe[:3])
 
 
-def test_from_performances_keeps_the_pace(bunch):
+def test_from_trials_keeps_the_pace(bunch):
     X = [bunch.data[0], bunch.data[1][::2], bunch.data[2]]
-    display = SkeletonDisplay.from_performances(X, bunch.skeleton, names=["a", "b", "c"])
+    display = SkeletonDisplay.from_trials(X, bunch.skeleton, names=["a", "b", "c"])
     (scene,) = display.scenes
     assert [len(x) for x in scene] == [len(x) for x in X]
     assert [tick.get_text() for tick in display.axes_[0].get_xticklabels()] == ["a", "b", "c"]
     # The short one has ended while the others are half way.
-    middle = SkeletonDisplay.from_performances(X, bunch.skeleton, at=0.6)
-    ended = SkeletonDisplay.from_performances([X[1]], bunch.skeleton, at=1.0)
+    middle = SkeletonDisplay.from_trials(X, bunch.skeleton, at=0.6)
+    ended = SkeletonDisplay.from_trials([X[1]], bunch.skeleton, at=1.0)
     alone = np.sort(np.ptp(bones_drawn(ended, 0)[..., 1], axis=1))
     heights = np.ptp(bones_drawn(middle, 0)[..., 1], axis=1)
     assert np.isclose(heights[:, np.newaxis], alone).any(axis=0).all()
-    with pytest.raises(ValueError, match="one for each of the 3 performances"):
-        SkeletonDisplay.from_performances(X, bunch.skeleton, names=["a"])
+    with pytest.raises(ValueError, match="one for each of the 3 trials"):
+        SkeletonDisplay.from_trials(X, bunch.skeleton, names=["a"])
 
 
 @pytest.mark.parametrize("keys", [["ann", "bob"], [("ann", 1), ("ann", 2)]])
-def test_performances_have_the_labels_of_a_table(bunch, keys):
+def test_trials_have_the_labels_of_a_table(bunch, keys):
     tables = [pd.DataFrame(x, columns=bunch.skeleton.column_names) for x in bunch.data[:2]]
-    labels = SkeletonDisplay.from_performances(pd.concat(tables, keys=keys), bunch.skeleton).labels
+    labels = SkeletonDisplay.from_trials(pd.concat(tables, keys=keys), bunch.skeleton).labels
     assert labels == [key if isinstance(key, str) else f"{key[0]}, {key[1]}" for key in keys]
-    assert SkeletonDisplay.from_performances(tables, bunch.skeleton).labels == ["0", "1"]
+    assert SkeletonDisplay.from_trials(tables, bunch.skeleton).labels == ["0", "1"]
 
 
 def test_a_root_that_stands_still_is_not_drawn():

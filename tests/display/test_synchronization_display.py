@@ -54,7 +54,7 @@ def test_title_names_the_pattern(bunch, pipe):
     assert display.group_means_ == [[], [], []]
     others = [x for i, x in enumerate(bunch.data) if i != pipe[2].pattern_index_]
     title = SynchronizationDisplay.from_estimator(pipe, others).axes_[1].get_title()
-    assert "template" in title
+    assert "pattern" in title
     assert "trial" not in title
 
 
@@ -99,7 +99,7 @@ def test_pandas_output_is_drawn_as_arrays_are(bunch, pipe):
     for features in (None, ["pelvis_height"]):
         one = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features)
         other = ActionModelDisplay.from_estimator(framed, bunch.data, features=features)
-        found, expected = other.performances, one.performances
+        found, expected = other.trials, one.trials
         np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
@@ -185,13 +185,13 @@ def test_tables_tell_their_frame_rate(bunch, pipe):
     given = {"unit": "seconds", "features": [0]}
     rates = [25.0 + k for k in range(len(tables))]
     for display in (SynchronizationDisplay, ActionModelDisplay):
-        with pytest.warns(UserWarning, match="Performance 1 has 26 frames a second"):
+        with pytest.warns(UserWarning, match="Trial 1 has 26 frames a second"):
             told = display.from_estimator(pipe, tables, **given)
         asked = display.from_estimator(pipe, bunch.data, frame_rate=rates, **given)
         for one, other in zip(np.ravel(told.axes_), np.ravel(asked.axes_), strict=True):
             assert one.get_xlim() == other.get_xlim()
         plt.close("all")
-        pytest_warns = pytest.warns(UserWarning, match="Performance 1 has 27 frames a second")
+        pytest_warns = pytest.warns(UserWarning, match="Trial 1 has 27 frames a second")
         with pytest_warns, pytest.raises(ValueError, match="needs frame_rate"):
             display.from_estimator(pipe, [*tables[1:], bunch.data[0]], **given)
 
@@ -359,15 +359,15 @@ def test_scaled_signals_are_drawn_as_recorded_with_names_and_units():
     assert [axis.get_ylabel() for axis in known.axes_[:4:2]] == labels
     assert known.axes_[-1].get_xlabel() == "% gait cycle"
     # A model, and its band.
-    for band in ("points", "performances"):
+    for band in ("points", "trials"):
         model = ActionModelDisplay.from_estimator(pipe, tables, band=band, **given)
-        lower, upper = pipe[2].envelope(simultaneous=band == "performances")
+        lower, upper = pipe[2].envelope(simultaneous=band == "trials")
         drawn = model.mean, model.lower, model.upper
         for found, scaled in zip(drawn, (pipe[2].mean_, lower, upper), strict=True):
             expected = pipe[0].inverse_transform(scaled)[:, [3, 0]]
             np.testing.assert_allclose(found, expected, atol=1e-9)
-        performances = pipe[0].inverse_transform(list(pipe[:2].transform(tables)))
-        np.testing.assert_allclose(model.performances, np.stack(performances)[:, :, [3, 0]])
+        trials = pipe[0].inverse_transform(list(pipe[:2].transform(tables)))
+        np.testing.assert_allclose(model.trials, np.stack(trials)[:, :, [3, 0]])
         assert [axis.get_ylabel() for axis in model.axes_] == labels
         assert model.axes_[0].get_xlabel() == "% gait cycle"
 
@@ -386,9 +386,9 @@ def test_features_of_other_steps_are_unscaled(bunch):
     last = pipe[-1].mean_.shape[1] - 1
     model = ActionModelDisplay.from_estimator(pipe, bunch.data, features=[4, last])
     whole = pipe[:-1].transform(bunch.data)
-    np.testing.assert_allclose(model.performances[8][:, 1], whole[8][:, last])
+    np.testing.assert_allclose(model.trials[8][:, 1], whole[8][:, last])
     unscaled = pipe[1].inverse_transform(whole[8][:, :last])
-    np.testing.assert_allclose(model.performances[8][:, 0], unscaled[:, 4])
+    np.testing.assert_allclose(model.trials[8][:, 0], unscaled[:, 4])
     # A scaler of the frames of rows is none of their one feature.
     rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
     pipe = make_pipeline(StandardScaler(), DenseSynchronizer(20)).fit(rows)

@@ -35,19 +35,19 @@ def test_artists_agree_with_the_track_of_hidden_features(tracker, display):
     names = [axis.get_ylabel() for axis in display.axes_]
     assert names[4:] == ["phase (%)", "rate"]
     shown = [NAMES.index(name) for name in names[:4]]
-    variance = track.postures.var(axis=0)
+    variance = track.poses.var(axis=0)
     assert shown == sorted(HIDDEN, key=lambda k: -variance[k])[:4]
     times = np.arange(len(SEEN)) / 30
     for i, k in enumerate(shown):
         np.testing.assert_allclose(display.estimates_[i].get_xdata(), times)
-        np.testing.assert_array_equal(display.estimates_[i].get_ydata(), track.postures[:, k])
+        np.testing.assert_array_equal(display.estimates_[i].get_ydata(), track.poses[:, k])
         np.testing.assert_array_equal(display.truths_[i].get_ydata(), X[4][:, k])
         np.testing.assert_array_equal(display.observed_[i].get_ydata(), SEEN[:, k])
         half = 1.645 * np.sqrt(track.covariances[:, k, k])
         n = len(times)
         upper_and_lower = display.bands_[i].get_paths()[0].vertices[:, 1]
-        assert upper_and_lower.max() == pytest.approx((track.postures[:, k] + half).max())
-        assert upper_and_lower.min() == pytest.approx((track.postures[:, k] - half).min())
+        assert upper_and_lower.max() == pytest.approx((track.poses[:, k] + half).max())
+        assert upper_and_lower.min() == pytest.approx((track.poses[:, k] - half).min())
         assert len(upper_and_lower) > 2 * n
     np.testing.assert_allclose(display.phase_.get_ydata(), 100 * track.phases / 23)
     np.testing.assert_array_equal(display.rate_.get_ydata(), track.rates)
@@ -98,7 +98,7 @@ def test_bodies_of_a_strip(display):
         strip.behind[1][0].reshape(-1), COSINES.inverse_transform(X[4])[10], atol=1e-12
     )
     np.testing.assert_allclose(
-        strip.scenes[1][0].reshape(-1), COSINES.inverse_transform(display.track.postures)[10]
+        strip.scenes[1][0].reshape(-1), COSINES.inverse_transform(display.track.poses)[10]
     )
     assert COSINES.hidden == "raise"
 
@@ -116,7 +116,7 @@ def test_times_units_and_tables(tracker):
     assert display.axes_[-1].get_xlabel() == "since the start (s)"
     track = tracker.smooth([SEEN])[0]
     drawn = TrackingDisplay.from_predictions(track, observed=SEEN, features=HIDDEN[0])
-    np.testing.assert_array_equal(drawn.estimates_[0].get_ydata(), track.postures[:, HIDDEN[0]])
+    np.testing.assert_array_equal(drawn.estimates_[0].get_ydata(), track.poses[:, HIDDEN[0]])
 
 
 def test_from_estimator_refuses(tracker, display):

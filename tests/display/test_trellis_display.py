@@ -22,7 +22,7 @@ def reachable(n_frames, width, steps):
 def test_disparity_space_agrees_with_brute_force(bunch, pipe, max_rate):
     points = pipe[:2].transform(bunch.data)
     dense = DenseSynchronizer.paper(n_frames=16, max_rate=max_rate, pattern=2).fit(points)
-    display = TrellisDisplay.from_estimator(dense, points, performance=5)
+    display = TrellisDisplay.from_estimator(dense, points, trial=5)
     grid = np.arange(16)
     base, moving = (
         np.array([np.interp(grid, np.linspace(0, 15, len(x)), k) for k in x.T]).T
@@ -49,34 +49,34 @@ def test_disparity_space_agrees_with_brute_force(bunch, pipe, max_rate):
 
 
 def test_cells_of_the_image_are_centred_on_offsets(bunch, pipe):
-    display = TrellisDisplay.from_estimator(pipe, bunch.data, performance=1)
+    display = TrellisDisplay.from_estimator(pipe, bunch.data, trial=1)
     left, right, bottom, top = display.image_.get_extent()
     assert (left, right) == (-0.5, 29.5)
     assert (bottom, top) == (display.space.offsets[0] - 0.5, display.space.offsets[-1] + 0.5)
-    assert f"template {pipe[2].pattern_index_}" in display.axes_[0].get_xlabel()
+    assert f"pattern {pipe[2].pattern_index_}" in display.axes_[0].get_xlabel()
     assert "trial 1" in display.axes_[0].get_title()
     points = pipe[:2].transform(bunch.data)
     np.testing.assert_array_equal(display.warp_.get_ydata(), pipe[2].match(points).offsets[1])
 
 
 def test_trellis_of_the_second_synchronizer(bunch):
-    """The performances are those that the first synchronizer returns."""
+    """The trials are those that the first synchronizer returns."""
     X = [x[:, :3] for x in bunch.data]
     linear, dense = LinearSynchronizer(25), DenseSynchronizer(20)
     pipe = make_pipeline(linear, dense).fit(X)
-    display = TrellisDisplay.from_estimator(pipe, X, performance=4)
-    expected = TrellisDisplay.from_estimator(dense, linear.transform(X), performance=4)
+    display = TrellisDisplay.from_estimator(pipe, X, trial=4)
+    expected = TrellisDisplay.from_estimator(dense, linear.transform(X), trial=4)
     np.testing.assert_array_equal(display.space.costs, expected.space.costs)
     np.testing.assert_array_equal(display.warp_.get_ydata(), expected.warp_.get_ydata())
 
 
 def test_disparity_space_of_long_takes_is_subsampled(bunch, pipe, monkeypatch):
     points = pipe[:2].transform(bunch.data)
-    whole = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
+    whole = TrellisDisplay.from_estimator(pipe[2], points, trial=1)
     monkeypatch.setattr(
         "sklearn_motionsync.matching.matcher.BATCH_NUMBERS", whole.space.costs.size // 7
     )
-    thin = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
+    thin = TrellisDisplay.from_estimator(pipe[2], points, trial=1)
     np.testing.assert_array_equal(thin.space.frames, np.arange(0, 30, 3))
     np.testing.assert_array_equal(thin.space.offsets, np.arange(-12, 13, 3))
     columns = np.searchsorted(whole.space.offsets, thin.space.offsets)

@@ -45,7 +45,7 @@ def test_repr_is_short():
     for skeleton in (Skeleton.paper(), Skeleton.acclaim(), Skeleton.kinect(), bunch.skeleton):
         assert len(repr(DirectionCosines(skeleton))) < 80
     match = DenseSynchronizer(20).fit(bunch.data).match(bunch.data)
-    assert repr(match) == "Match(5 performances on 20 frames)"
+    assert repr(match) == "Match(5 trials on 20 frames)"
     # A pattern given as an array does not spell itself out.
     assert len(repr(DenseSynchronizer(pattern=bunch.data[0]))) < 2000
 

@@ -18,10 +18,10 @@ PAGES = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path 
 # Words that only this project knows, and what to write instead. Code does not count, nor do
 # *italics*, in which a page may name the word that the code has for a thing.
 INSTEAD = {
-    r"performances?": "trial",
-    r"postures?": "pose",
-    r"patterns?": "template",
-    r"clocks?": "time axis, frames of the template",
+    r"trials?": "trial",
+    r"poses?": "pose",
+    r"patterns?": "pattern",
+    r"clocks?": "time axis, frames of the pattern",
     r"yardsticks?|rulers?": "measure",
     r"journeys?": "from your files to a figure",
     r"strangers?": "new people",
@@ -80,5 +80,5 @@ def test_page_has_no_private_words(name):
 
 
 def test_private_words_are_found_in_prose_only():
-    page = "# Clocks\n\nIt says\nso. A *clock* is a `pattern`, see [postures](strangers.md).\n"
+    page = "# Clocks\n\nIt says\nso. A *clock* is a `pattern`, see [poses](strangers.md).\n"
     assert [new for _, new in private_words(page)] == ["pose", "name what is said"]

@@ -25,7 +25,7 @@ def errors(walk, found, ruler):
     """Errors in milliseconds by label, the number missed, and that in excess."""
     triples = []
     for i, events in enumerate(walk.events):
-        own = found[found["performance"] == i]
+        own = found[found["trial"] == i]
         listed = list(own[["label", "context", "time"]].itertuples(index=False, name=None))
         true = [(event["label"], event["context"], event["time"]) for event in events]
         triples.append(ruler.compare(listed, true))
@@ -271,7 +271,7 @@ def test_labels_of_recordings(walk):
     tables = []
     for k, x in enumerate(walk.data[:2]):
         df = pd.DataFrame(x, columns=walk.skeleton.column_names)
-        df.attrs |= {"performance": f"walk {k}", "levels": ("trial", "frame"), "frame_rate": 100.0}
+        df.attrs |= {"trial": f"walk {k}", "levels": ("trial", "frame"), "frame_rate": 100.0}
         tables.append(df)
     found = gait_events(tables)
     assert found.columns.tolist() == ["trial", "label", "context", "frame", "time"]
@@ -291,7 +291,7 @@ def test_nothing_of_people_that_stand(ruler, real_data, capsys):
 def test_rate_and_noise_hardly_matter_on_people(ruler, real_data):
     """Twelve walks: 30 frames a second, and a centimetre of noise."""
     (label, metres) = ruler.PEOPLE["cmu07_walk"]
-    bunch = ruler.load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    bunch = ruler.load_trials(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
     for rate, noise, most in ((30, 0, 5), (None, 0.01, 12)):
         triples = []
         for k, x in enumerate(bunch.data):
@@ -312,17 +312,17 @@ def test_rate_and_noise_hardly_matter_on_people(ruler, real_data):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"frame_rate": None}, "The frame rate of performance 0 is not known: give frame_rate="),
+        ({"frame_rate": None}, "The frame rate of trial 0 is not known: give frame_rate="),
         ({"skeleton": None}, "Arrays do not name their joints: give a skeleton"),
         ({"feet": {"heel": "left_heel"}}, "feet: 'heel' is none of left_heel, left_toe"),
         ({"feet": {"left_heel": "LHEE"}}, "feet: 'left_heel' is at 'LHEE', which is no joint"),
         (
             {"frame_rate": 0.01},
-            "Performance 0 has a frame rate of 0.01; recordings of people have 1",
+            "Trial 0 has a frame rate of 0.01; recordings of people have 1",
         ),
         ({"frame_rate": 1e5}, "Give frame_rate= in frames a second"),
-        ({"X": [np.zeros((20, 57))]}, "Performance 0 has 20 frames at 100 a second; 0.25 s and 4"),
-        ({"X": [np.zeros((50, 6))]}, "Performance 0 has 6 features a frame, but the skeleton's 19"),
+        ({"X": [np.zeros((20, 57))]}, "Trial 0 has 20 frames at 100 a second; 0.25 s and 4"),
+        ({"X": [np.zeros((50, 6))]}, "Trial 0 has 6 features a frame, but the skeleton's 19"),
     ],
 )
 def test_refused(walk, arguments, message):
@@ -338,11 +338,11 @@ def test_bodies_that_cannot_be_read(walk):
         for part in ("heel", "ankle"):
             column = 3 * skeleton.joints.index(f"{side}_{part}")
             hidden[:, column : column + 3] = np.nan
-    with pytest.raises(ValueError, match="Performance 0: no heel and no ankle is seen"):
+    with pytest.raises(ValueError, match="Trial 0: no heel and no ankle is seen"):
         gait_events([hidden], skeleton, frame_rate=100)
     upside = Skeleton(skeleton.joints, skeleton.parents, dict(skeleton.landmarks), up="-y")
-    with pytest.raises(ValueError, match="Performance 0: the pelvis is never seen above the feet"):
+    with pytest.raises(ValueError, match="Trial 0: the pelvis is never seen above the feet"):
         gait_events([x], upside, frame_rate=100)
     legs = {"left_knee": "left_knee", "left_ankle": "left_ankle"}
-    with pytest.raises(ValueError, match="Performance 0: the skeleton has no pelvis and no hip"):
+    with pytest.raises(ValueError, match="Trial 0: the skeleton has no pelvis and no hip"):
         gait_events([x], Skeleton(skeleton.joints, skeleton.parents, legs), frame_rate=100)

@@ -74,11 +74,11 @@ def test_given_events_count():
     expected = gait_parameters(walk.data, walk.skeleton, frame_rate=100)
     for columns in (["label", "context", "frame"], ["label", "context", "time"]):
         found = gait_parameters(
-            walk.data, walk.skeleton, events=events[["performance", *columns]], frame_rate=100
+            walk.data, walk.skeleton, events=events[["trial", *columns]], frame_rate=100
         )
         pd.testing.assert_frame_equal(found, expected)
     unknown = pd.DataFrame(
-        {"performance": [0], "label": ["Foot Off"], "context": ["Left"], "time": [np.nan]}
+        {"trial": [0], "label": ["Foot Off"], "context": ["Left"], "time": [np.nan]}
     )
     found = gait_parameters(
         walk.data, walk.skeleton, events=pd.concat([events, unknown]).drop(columns="frame"),
@@ -121,18 +121,16 @@ def test_no_strides():
         (pd.DataFrame({"label": [], "time": []}), "events: there is no column 'context'"),
         (pd.DataFrame({"label": [], "context": []}), "events: there is no column 'frame'"),
         (
-            pd.DataFrame(
-                {"performance": [7], "label": ["Foot Off"], "context": ["Left"], "time": [1]}
-            ),
+            pd.DataFrame({"trial": [7], "label": ["Foot Off"], "context": ["Left"], "time": [1]}),
             "events: recording 7 is not in X, whose labels are",
         ),
         (
             pd.DataFrame({"label": ["Foot Off"], "context": ["Left"], "frame": [9999]}),
-            "events: Foot Off Left at frame 9999 is outside of performance 0",
+            "events: Foot Off Left at frame 9999 is outside of trial 0",
         ),
         (
             pd.DataFrame({"label": ["Foot Off"], "context": ["Left"], "time": [-1.5]}),
-            "events: Foot Off Left at time -1.5 is outside of performance 0",
+            "events: Foot Off Left at time -1.5 is outside of trial 0",
         ),
     ],
 )

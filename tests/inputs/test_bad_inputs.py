@@ -39,14 +39,14 @@ MORE = [df.assign(toe=df["hip"]) for df in FRAMES]
 TWICE = FRAMES[2].set_axis(["hip", "knee", "hip"], axis=1)
 NUMBERED = [pd.DataFrame(x, columns=[10, 20, 30]) for x in X]
 MIXED = [pd.DataFrame(x, columns=["hip", 1, 2]) for x in X]
-LABELLED = to_frame(FRAMES, performances=["ann", "bob", "cem", "dov", "eva"])
-LONG = LABELLED.reset_index().rename(columns={"performance": "trial", "frame": "time"})
+LABELLED = to_frame(FRAMES, trials=["ann", "bob", "cem", "dov", "eva"])
+LONG = LABELLED.reset_index().rename(columns={"trial": "trial", "frame": "time"})
 DATES = pd.date_range("2020", periods=20)
-CALL = "to_sequences(df, by=..., time=...)"
+CALL = "to_trials(df, by=..., time=...)"
 
 
 def one(change, i=2):
-    """The performances, one of them changed."""
+    """The trials, one of them changed."""
     return [change(x.copy()) if k == i else x for k, x in enumerate(X)]
 
 
@@ -93,34 +93,34 @@ def refuses(call, words, error=(ValueError, TypeError)):
     assert len(message) < 1000
 
 
-# -- performances -------------------------------------------------------------------------
+# -- trials -------------------------------------------------------------------------
 
-PERFORMANCES = [
+TRIALS = [
     # input, estimators, words
-    (one(masked), OF_EACH_KIND, ["Performance 2", "masked", "interpolate"]),
-    (one(lambda x: list(masked(x))), ALL, ["Performance 2", "masked"]),
-    (one(lambda x: masked(x).astype(object)), ALL, ["Performance 2", "masked"]),
-    (one(put(1j)), ALL, ["Performance 2", "complex"]),
-    (one(put("text")), ALL, ["Performance 2", "'text'"]),
-    (one(put("1.5")), ALL, ["Performance 2", "'1.5'", "numbers"]),
-    (one(lambda x: x.astype(str)), ALL, ["Performance 2", "not a numeric array"]),
-    (one(lambda x: x.astype("m8[s]")), ALL, ["Performance 2", "durations", "seconds"]),
-    (one(lambda x: x.astype("M8[s]")), ALL, ["Performance 2", "dates", "seconds"]),
-    (one(lambda x: FRAMES[2].assign(hip=DATES)), ALL, ["Performance 2", "'hip'", "dates"]),
-    (one(lambda x: FRAMES[2].assign(hip="a")), ALL, ["Performance 2", "'hip'", "'a'"]),
-    (one(lambda x: csr_array(x)), ALL, ["Performance 2", "sparse", "toarray"]),
+    (one(masked), OF_EACH_KIND, ["Trial 2", "masked", "interpolate"]),
+    (one(lambda x: list(masked(x))), ALL, ["Trial 2", "masked"]),
+    (one(lambda x: masked(x).astype(object)), ALL, ["Trial 2", "masked"]),
+    (one(put(1j)), ALL, ["Trial 2", "complex"]),
+    (one(put("text")), ALL, ["Trial 2", "'text'"]),
+    (one(put("1.5")), ALL, ["Trial 2", "'1.5'", "numbers"]),
+    (one(lambda x: x.astype(str)), ALL, ["Trial 2", "not a numeric array"]),
+    (one(lambda x: x.astype("m8[s]")), ALL, ["Trial 2", "durations", "seconds"]),
+    (one(lambda x: x.astype("M8[s]")), ALL, ["Trial 2", "dates", "seconds"]),
+    (one(lambda x: FRAMES[2].assign(hip=DATES)), ALL, ["Trial 2", "'hip'", "dates"]),
+    (one(lambda x: FRAMES[2].assign(hip="a")), ALL, ["Trial 2", "'hip'", "'a'"]),
+    (one(lambda x: csr_array(x)), ALL, ["Trial 2", "sparse", "toarray"]),
     (one(lambda x: x.astype(np.longdouble) * np.longdouble("1e400")), ALL, ["2", "infinity"]),
-    (one(lambda x: [[10**400, 1, 2]] * 20), ALL, ["Performance 2", "too large"]),
-    (one(put(-2e9)), ALL, ["Performance 2", "2e+09", "between 1e-09 and 1e+09", "unit"]),
-    (one(lambda x: (1e30 * x).astype("f4")), ALL, ["Performance 2", "e+3", "another unit"]),
+    (one(lambda x: [[10**400, 1, 2]] * 20), ALL, ["Trial 2", "too large"]),
+    (one(put(-2e9)), ALL, ["Trial 2", "2e+09", "between 1e-09 and 1e+09", "unit"]),
+    (one(lambda x: (1e30 * x).astype("f4")), ALL, ["Trial 2", "e+3", "another unit"]),
     ([1e-12 * x for x in X], ALL, ["between 1e-09 and 1e+09", "unit"]),
     (1e-12 * X[0], ALL, ["Row ", "between 1e-09 and 1e+09", "unit"]),
     (np.full((4, 9), 2e9), ALL, ["Row 0", "2e+09", "unit"]),
-    (one(lambda x: x[:0]), ALL, ["Performance 2 has shape (0, 3)", "at least 2 frames"]),
-    (one(lambda x: x[:, :0]), ALL, ["Performance 2", "(20, 0)", "1 feature"]),
-    (one(lambda x: x[:, 0]), ALL, ["Performance 2 has shape (20,), expected (n_frames"]),
-    (one(lambda x: x[None]), ALL, ["Performance 2 has shape (1, 20, 3), expected"]),
-    (np.empty((0, 10, 3)), ALL, ["0 performances"]),
+    (one(lambda x: x[:0]), ALL, ["Trial 2 has shape (0, 3)", "at least 2 frames"]),
+    (one(lambda x: x[:, :0]), ALL, ["Trial 2", "(20, 0)", "1 feature"]),
+    (one(lambda x: x[:, 0]), ALL, ["Trial 2 has shape (20,), expected (n_frames"]),
+    (one(lambda x: x[None]), ALL, ["Trial 2 has shape (1, 20, 3), expected"]),
+    (np.empty((0, 10, 3)), ALL, ["0 trials"]),
     (np.zeros((2, 3, 4, 5)), ALL, ["shape (2, 3, 4, 5)"]),
     (np.zeros(5), ALL, ["xpected 2D array"]),
     ([np.zeros(3), np.zeros(4)], ALL, ["x[:, np.newaxis]"]),
@@ -128,14 +128,14 @@ PERFORMANCES = [
     (
         one(lambda x: [[1, 2, 3], [4, 5]]),
         ALL,
-        ["Performance 2", "not a numeric array", "parts differ in length", "times of spikes"],
+        ["Trial 2", "not a numeric array", "parts differ in length", "times of spikes"],
     ),
     (LABELLED.mask(LABELLED["knee"] == X[1][4, 1]), WHOLE, ["'bob'", "frame 4", "'hip'", "NaN"]),
-    ([*FRAMES[:2], FRAMES[2][NAMES[:2]]], ALL, ["Performance 2", "it lacks ['ankle']", "common"]),
-    ([*FRAMES[:2], MORE[2]], ALL, ["Performance 2", "has besides ['toe']", "columns='common'"]),
-    ([*FRAMES[:2], X[2]], ALL, ["Performance 2 has the columns None", "['hip',"]),
-    ([*FRAMES[:2], TWICE], ALL, ["Performance 2", "['hip', 'knee', 'hip']", "lacks ['ankle']"]),
-    ([*NUMBERED[:2], NUMBERED[2].add_prefix("n")], ALL, ["Performance 2", "'n10'", "[10, 20, 30]"]),
+    ([*FRAMES[:2], FRAMES[2][NAMES[:2]]], ALL, ["Trial 2", "it lacks ['ankle']", "common"]),
+    ([*FRAMES[:2], MORE[2]], ALL, ["Trial 2", "has besides ['toe']", "columns='common'"]),
+    ([*FRAMES[:2], X[2]], ALL, ["Trial 2 has the columns None", "['hip',"]),
+    ([*FRAMES[:2], TWICE], ALL, ["Trial 2", "['hip', 'knee', 'hip']", "lacks ['ankle']"]),
+    ([*NUMBERED[:2], NUMBERED[2].add_prefix("n")], ALL, ["Trial 2", "'n10'", "[10, 20, 30]"]),
     (MIXED, ALL, ["['int', 'str']", "astype(str)"]),
     (["a.csv", "b.csv"], ALL, ["'a.csv'", "pd.read_csv(path) reads files"]),
     (["a.bvh", "b.bvh"], ALL, ["'a.bvh'", "read_motion(path) reads files"]),
@@ -145,10 +145,10 @@ PERFORMANCES = [
     (X[0].astype("m8[s]"), ALL, ["durations"]),
     (X[0].astype(str).tolist(), ALL, ["not a numeric array"]),
     (LONG.drop(columns="trial"), SEQUENCES, [CALL, "'time'"]),
-    (FRAMES[0], SEQUENCES, ["'hip'", "to_sequences", "to_numpy()"]),
+    (FRAMES[0], SEQUENCES, ["'hip'", "to_trials", "to_numpy()"]),
     (LONG, ALL, ["'trial'", "'ann'"]),
     (LABELLED.assign(k=1).set_index("k", append=True), SEQUENCES, ["(1, 3)", "at least 2 frames"]),
-    (X[0].tolist()[:2] + [[1.0]], ALL, ["Performance 0 has 3 values", "x[:, np.newaxis]"]),
+    (X[0].tolist()[:2] + [[1.0]], ALL, ["Trial 0 has 3 values", "x[:, np.newaxis]"]),
     (set("ab"), ALL, ["got set", "list"]),
     (pd.Series({"a": X[0]}), ALL, ["got Series", "list"]),
     (map(np.array, X), ALL, ["got map", "list"]),
@@ -156,22 +156,22 @@ PERFORMANCES = [
     (
         [x.T[:, : 15 + i] for i, x in enumerate(X)],
         ALL,
-        ["Performance 1 has 16", "[x.T for x in X]"],
+        ["Trial 1 has 16", "[x.T for x in X]"],
     ),
-    (one(lambda x: x.view("f8,f8,f8")[:, 0]), ALL, ["Performance 2", "structured", "3 fields"]),
+    (one(lambda x: x.view("f8,f8,f8")[:, 0]), ALL, ["Trial 2", "structured", "3 fields"]),
     ([x.view("f8,f8,f8")[:, 0] for x in X], ALL, ["structured array", "(x)"]),
-    (one(lambda x: dict(enumerate(x))), ALL, ["Performance 2 is of type dict"]),
-    (one(lambda x: iter(x)), ALL, ["Performance 2 is of type"]),
-    (one(lambda x: None), ALL, ["Performance 2 is of type NoneType"]),
-    ([df.set_axis([*"aab"], axis=1) for df in FRAMES], ALL, ["Performance 0", "2 columns", "'a'"]),
+    (one(lambda x: dict(enumerate(x))), ALL, ["Trial 2 is of type dict"]),
+    (one(lambda x: iter(x)), ALL, ["Trial 2 is of type"]),
+    (one(lambda x: None), ALL, ["Trial 2 is of type NoneType"]),
+    ([df.set_axis([*"aab"], axis=1) for df in FRAMES], ALL, ["Trial 0", "2 columns", "'a'"]),
     (FDataGrid(), ALL, ["got FDataGrid", "list(X.data_matrix)"]),
     ([Dataset(), Dataset()], ALL, ["got Dataset", "from_poses(poses)]"]),
     (Dataset(), ALL, ["got Dataset", "from_poses(X)"]),
-    (NESTED.assign(age=30), ALL, ["Column 'age' of performance 0 holds 30", "drop"]),
+    (NESTED.assign(age=30), ALL, ["Column 'age' of trial 0 holds 30", "drop"]),
     (
         NESTED.assign(knee=NESTED["knee"].map(lambda x: x[:9])),
         ALL,
-        ["'knee' of performance 0", "9"],
+        ["'knee' of trial 0", "9"],
     ),
     (NESTED.assign(hip=[x.set_axis(x.index + 1) for x in NESTED["hip"]]), ALL, ["same frames"]),
 ]
@@ -179,7 +179,7 @@ PERFORMANCES = [
 
 @pytest.mark.parametrize(
     ("given", "estimator", "words"),
-    [(given, e, words) for given, estimators, words in PERFORMANCES for e in estimators],
+    [(given, e, words) for given, estimators, words in TRIALS for e in estimators],
     ids=by_name,
 )
 def test_fit_refuses(given, estimator, words):
@@ -193,13 +193,13 @@ def test_fit_refuses(given, estimator, words):
 
 FITTED_ON = [
     # fitted on, input, estimators, words
-    (FRAMES, MORE, ALL, ["Performance 0", "'toe'", "feature names should match"]),
-    (FRAMES, [FRAMES[0], MORE[1]], ALL, ["Performance 1", "'toe'", "feature names should match"]),
+    (FRAMES, MORE, ALL, ["Trial 0", "'toe'", "feature names should match"]),
+    (FRAMES, [FRAMES[0], MORE[1]], ALL, ["Trial 1", "'toe'", "feature names should match"]),
     (NUMBERED, FRAMES, ALL, ["'hip'", "[10, 20, 30]"]),
     (X, [x[:, :2] for x in X], ALL, ["2 features", "expecting 3"]),
-    (X, one(masked), OF_EACH_KIND, ["Performance 2", "masked"]),
-    (X, one(lambda x: x + 0j), ALL, ["Performance 2", "complex"]),
-    (X, one(lambda x: 1e35 * x), ALL, ["Performance 2", "e+3", "another unit"]),
+    (X, one(masked), OF_EACH_KIND, ["Trial 2", "masked"]),
+    (X, one(lambda x: x + 0j), ALL, ["Trial 2", "complex"]),
+    (X, one(lambda x: 1e35 * x), ALL, ["Trial 2", "e+3", "another unit"]),
     (X, X[0], SEQUENCES, ["wrap one sequence as [X]"]),
     (np.stack(X)[:, :, 0], X, SEQUENCES, ["2-D"]),
 ]
@@ -239,10 +239,10 @@ def test_messages_about_columns_are_short():
     tables = [pd.DataFrame(np.ones((3, 210)), columns=names) for _ in range(2)]
     tables[1] = tables[1].add_prefix("x")
     for k, x in enumerate(tables):
-        x.attrs["performance"] = "a recording of a long name" * 9 + str(k)
+        x.attrs["trial"] = "a recording of a long name" * 9 + str(k)
     fitted = ASpace().fit(tables[:1])
     for ask in (ASpace().fit, fitted.transform):
-        with pytest.raises(ValueError, match="Performance 1") as caught:
+        with pytest.raises(ValueError, match="Trial 1") as caught:
             ask(tables)
         assert len(str(caught.value)) < 600
 
@@ -270,7 +270,7 @@ PARAMETERS = [
     (SEQUENCES, {"pattern": X[0].astype("m8[s]")}, ["pattern", "durations"]),
     (SEQUENCES, {"pattern": [["a"] * 3] * 5}, ["pattern", "'a'"]),
     (SEQUENCES, {"pattern": True}, ["pattern", "index", "True"]),
-    (SYNCHRONIZERS, {"pattern": 5}, ["pattern=5", "5 performances"]),
+    (SYNCHRONIZERS, {"pattern": 5}, ["pattern=5", "5 trials"]),
     (SEQUENCES, {"pattern": 1e40 * X[0]}, ["The pattern", "another unit"]),
     (SYNCHRONIZERS, {"n_frames": 10**9}, ["n_frames = 1000000000", "GB"]),
     (
@@ -307,38 +307,38 @@ DENSE = DenseSynchronizer().fit(X)
 MATCH = LinearSynchronizer().fit(X).match(X)
 CALLS = [
     # call, words
-    (lambda: MODEL.accepts(masked(X[0]), 0), ["postures", "masked"]),
-    (lambda: MODEL.accepts(X[0] + 0j, 0), ["postures", "complex"]),
-    (lambda: MODEL.accepts(X[0].astype("m8[s]"), 0), ["postures", "durations"]),
-    (lambda: MODEL.accepts(put(np.inf, X[0]), 0), ["postures, row 4, feature 1 is infinity"]),
+    (lambda: MODEL.accepts(masked(X[0]), 0), ["poses", "masked"]),
+    (lambda: MODEL.accepts(X[0] + 0j, 0), ["poses", "complex"]),
+    (lambda: MODEL.accepts(X[0].astype("m8[s]"), 0), ["poses", "durations"]),
+    (lambda: MODEL.accepts(put(np.inf, X[0]), 0), ["poses, row 4, feature 1 is infinity"]),
     (lambda: FRAMED.accepts(put(np.inf, X[0]), 0), ["feature 1 ('knee') is infinity"]),
-    (lambda: FRAMED.accepts(TURNED[0], 0), ["postures", "same order"]),
-    (lambda: MODEL.accepts(X[0][0], 0), ["shape (n_postures, 3)", "[posture]"]),
+    (lambda: FRAMED.accepts(TURNED[0], 0), ["poses", "same order"]),
+    (lambda: MODEL.accepts(X[0][0], 0), ["shape (n_poses, 3)", "[pose]"]),
     (lambda: MODEL.accepts(X[0], 20), ["frame", "0 to 19"]),
     (lambda: SPACE.inverse_transform(pd.DataFrame(X[0][:, :2], columns=list("ba"))), ["names"]),
     (lambda: KEYS.fit(X, keyframes="abcde"), ["keyframes", "not a numeric array"]),
-    (lambda: KEYS.fit(X, keyframes=[["a", "b"]] * 5), ["Performance 0", "keyframes", "'a'"]),
-    (lambda: KEYS.fit(X, keyframes=[DATES[:2]] * 5), ["Performance 0", "keyframes"]),
-    (lambda: KEYS.fit(X, keyframes=[[5 + 0j, 9]] * 5), ["Performance 0", "complex"]),
-    (lambda: KEYS.fit(X, keyframes=[[0.31, 0.62]] * 5), ["Performance 0", "seconds * frame_rate"]),
-    (lambda: KEYED.transform(X[:1], keyframes=[[0.3, 0.6]]), ["Performance 0", "[0.3, 0.6]"]),
+    (lambda: KEYS.fit(X, keyframes=[["a", "b"]] * 5), ["Trial 0", "keyframes", "'a'"]),
+    (lambda: KEYS.fit(X, keyframes=[DATES[:2]] * 5), ["Trial 0", "keyframes"]),
+    (lambda: KEYS.fit(X, keyframes=[[5 + 0j, 9]] * 5), ["Trial 0", "complex"]),
+    (lambda: KEYS.fit(X, keyframes=[[0.31, 0.62]] * 5), ["Trial 0", "seconds * frame_rate"]),
+    (lambda: KEYED.transform(X[:1], keyframes=[[0.3, 0.6]]), ["Trial 0", "[0.3, 0.6]"]),
     (lambda: KEYED.transform(X), ["fitted with key-frames", "keyframes=[...]"]),
-    (lambda: Match([[0, 3, 1, 3]]), ["Performance 0", "must not decrease", "1 at frame 2"]),
+    (lambda: Match([[0, 3, 1, 3]]), ["Trial 0", "must not decrease", "1 at frame 2"]),
     (lambda: Match(np.ma.masked_equal([[0, 1, 2]], 1)), ["times", "masked"]),
     (lambda: Match([["a", "b"]]), ["times", "'a'"]),
     (lambda: Match([[0, 1j]]), ["times", "complex"]),
-    (lambda: Match([[0, np.nan, 2]]), ["Performance 0", "times"]),
+    (lambda: Match([[0, np.nan, 2]]), ["Trial 0", "times"]),
     (lambda: Match([[0, 1]], np.ma.masked_equal([1], 1)), ["distances", "masked"]),
-    (lambda: MATCH.warp(one(masked)), ["Performance 2", "masked"]),
+    (lambda: MATCH.warp(one(masked)), ["Trial 2", "masked"]),
     (lambda: MATCH.seconds(X, "fast"), ["frame_rate", "'fast'"]),
     (lambda: MATCH.frames(["a"] * 5), ["lengths", "'a'"]),
     (lambda: to_frame(X[0]), ["single 2-D input", "[X]"]),
     (lambda: to_frame(X, columns=["a"]), ["3 features", "got 1"]),
-    (lambda: to_frame(X[:2], performances=["a", None]), ["Performance 1", "no label", "None"]),
-    (lambda: to_frame(X[:2], performances=pd.Index([np.nan, 1])), ["Performance 0", "no label"]),
-    (lambda: to_frame(X[:2], performances=[("a", 1), ("a", pd.NA)]), ["Performance 1", "<NA>"]),
-    (lambda: MATCH.to_frame(labels=[*"abcd", pd.NaT]), ["Performance 4", "no label", "NaT"]),
-    (lambda: DENSE.disparity_space(X, performance=True), ["performance=True", "0 to 4"]),
+    (lambda: to_frame(X[:2], trials=["a", None]), ["Trial 1", "no label", "None"]),
+    (lambda: to_frame(X[:2], trials=pd.Index([np.nan, 1])), ["Trial 0", "no label"]),
+    (lambda: to_frame(X[:2], trials=[("a", 1), ("a", pd.NA)]), ["Trial 1", "<NA>"]),
+    (lambda: MATCH.to_frame(labels=[*"abcd", pd.NaT]), ["Trial 4", "no label", "NaT"]),
+    (lambda: DENSE.disparity_space(X, trial=True), ["trial=True", "0 to 4"]),
 ]
 
 
@@ -349,7 +349,7 @@ def test_call_refuses(call, words):
 
 def test_fit_warns_of_a_clock_among_the_features():
     clocks = [np.column_stack([0.02 * np.arange(len(x)), x]) for x in X]
-    with pytest.warns(UserWarning, match="Feature 0 increases evenly in every performance"):
+    with pytest.warns(UserWarning, match="Feature 0 increases evenly in every trial"):
         LinearSynchronizer().fit(clocks)
     named = [pd.DataFrame(x, columns=["time", *NAMES]).round(3) for x in clocks]
     with pytest.warns(UserWarning, match="Feature 'time' .* clock"):
@@ -383,7 +383,7 @@ def test_fit_takes_fewer_frames_than_features_in_the_right_order(estimator):
 def test_fit_warns_of_one_trial_that_is_taken_as_many(estimator):
     rng = np.random.default_rng(0)
     trial = np.cumsum(rng.standard_normal((100, 6)), axis=0)
-    with pytest.warns(UserWarning, match=r"100 univariate performances of 6 frames.* as \[X\]"):
+    with pytest.warns(UserWarning, match=r"100 univariate trials of 6 frames.* as \[X\]"):
         clone(estimator).fit(trial)
     bend = np.sin(np.linspace(0, 3, 30)) * rng.uniform(0.9, 1.1, (60, 1))
     clone(estimator).fit(bend + 0.01 * rng.standard_normal(bend.shape))
@@ -391,19 +391,19 @@ def test_fit_warns_of_one_trial_that_is_taken_as_many(estimator):
 
 @pytest.mark.parametrize("estimator", OF_EACH_KIND, ids=by_name)
 def test_fit_accepts_magnitudes_within_the_limits(estimator):
-    """The lower limit is of a training set as a whole: single performances may be tiny."""
+    """The lower limit is of a training set as a whole: single trials may be tiny."""
     for factor in (1e-8, 1e7):
         clone(estimator).fit([factor * x for x in X])
     fitted = clone(estimator).fit([*X, 1e-12 * X[0], 0 * X[0]])
     if hasattr(fitted, "transform"):
-        # An answer for one performance does not depend on the others.
+        # An answer for one trial does not depend on the others.
         fitted.transform([1e-12 * X[0]])
 
 
 @pytest.mark.parametrize(
     "other", [np.zeros(20), -np.arange(20.0), np.arange(20.0) ** 1.2, np.r_[0:10, 9:19]]
 )
-def test_no_warning_of_what_is_no_clock_in_every_performance(other):
+def test_no_warning_of_what_is_no_clock_in_every_trial(other):
     ramps = [np.column_stack([0.02 * np.arange(len(x)), x]) for x in X]
     LinearSynchronizer().fit([*ramps, np.column_stack([other, X[0]])])
     LinearSynchronizer().fit([ramp[:, :1] for ramp in ramps])

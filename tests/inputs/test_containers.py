@@ -1,4 +1,4 @@
-"""Performances as other packages keep them: nested tables, labelled arrays, tables of two levels.
+"""Trials as other packages keep them: nested tables, labelled arrays, tables of two levels.
 
 The objects are made by hand, as sktime, aeon, xarray and polars make them.
 """
@@ -20,7 +20,7 @@ from sklearn_motionsync import (
     Match,
     TimingChannel,
     to_frame,
-    to_sequences,
+    to_trials,
 )
 
 NAMES = ["hip", "knee", "ankle"]
@@ -53,13 +53,13 @@ def same_bits(found, expected):
 
 
 @pytest.mark.parametrize("cell", [pd.Series, np.asarray, list], ids=["Series", "array", "list"])
-def test_a_nested_table_is_a_performance_a_row(trials, cell):
+def test_a_nested_table_is_a_trial_a_row(trials, cell):
     people = pd.Index([f"person {i}" for i in range(12)], name="person")
     table = nested(trials, people, cell)
-    found = to_sequences(table)
+    found = to_trials(table)
     same_bits(found, trials)
     assert [list(x.columns) for x in found] == [NAMES] * 12
-    assert [x.attrs["performance"] for x in found] == list(people)
+    assert [x.attrs["trial"] for x in found] == list(people)
     whole = to_frame(table)
     assert list(whole.index.names) == ["person", "frame"]
     same_bits([whole.to_numpy()], [np.concatenate(trials)])
@@ -70,7 +70,7 @@ def test_a_nested_table_is_a_performance_a_row(trials, cell):
 
 def test_a_nested_table_and_back(trials):
     table = nested(trials, pd.RangeIndex(12))
-    rows = [{n: x[n].set_axis(pd.RangeIndex(len(x))) for n in x} for x in to_sequences(table)]
+    rows = [{n: x[n].set_axis(pd.RangeIndex(len(x))) for n in x} for x in to_trials(table)]
     back = pd.DataFrame(rows)
     for name in NAMES:
         for a, b in zip(back[name], table[name], strict=True):
@@ -81,9 +81,9 @@ def test_cells_keep_times_types_and_labels_of_several_levels(trials):
     clock = pd.date_range("2026-01-01", periods=24, freq="10ms", name="clock")
     single = [x[:24].astype(np.float32) for x in trials[:2]]
     index = pd.MultiIndex.from_tuples([("ann", 1), ("ann", 2)], names=["person", "trial"])
-    found = to_sequences(nested(single, index, lambda x: pd.Series(x, clock)))
+    found = to_trials(nested(single, index, lambda x: pd.Series(x, clock)))
     same_bits(found, single)
-    assert [x.attrs["performance"] for x in found] == [("ann", 1), ("ann", 2)]
+    assert [x.attrs["trial"] for x in found] == [("ann", 1), ("ann", 2)]
     assert to_frame(found).index.names == ["person", "trial", "clock"]
     assert all(x.index.equals(clock) for x in found)
     assert to_frame(found).attrs == {}
@@ -92,7 +92,7 @@ def test_cells_keep_times_types_and_labels_of_several_levels(trials):
     assert seconds.max() == pytest.approx(0.23)
 
 
-def test_scikit_learn_splits_a_nested_table_by_performance(trials):
+def test_scikit_learn_splits_a_nested_table_by_trial(trials):
     y = np.arange(12) % 2
     classifier = ActionClassifier(n_frames=10)
     scores = [cross_val_score(classifier, X, y, cv=3) for X in (nested(trials), trials)]
@@ -122,7 +122,7 @@ def test_lists_in_a_table_of_polars(trials):
         **{name: np.concatenate([x[:, k] for x in trials]) for k, name in enumerate(NAMES)}
     )
     table = rows.group_by("trial", maintain_order=True).agg(pl.all()).drop("trial")
-    same_bits(to_sequences(table), trials)
+    same_bits(to_trials(table), trials)
     same_bits([sync().fit(table).transform(table)], [sync().fit(trials).transform(trials)])
 
 
@@ -133,8 +133,8 @@ def test_lists_in_a_table_of_polars(trials):
 def test_a_table_of_two_levels_and_back(trials, names):
     index = pd.concat([pd.DataFrame(x) for x in trials], keys=range(12)).index.set_names(names)
     table = pd.DataFrame(np.concatenate(trials), index=index, columns=NAMES)
-    same_bits(to_sequences(table), trials)
-    back = to_frame(to_sequences(table))
+    same_bits(to_trials(table), trials)
+    back = to_frame(to_trials(table))
     pd.testing.assert_frame_equal(back, table.rename_axis(back.index.names), check_exact=True)
 
 
@@ -175,9 +175,9 @@ def test_a_labelled_array_keeps_names_times_and_units(trials, order):
     array = labelled(trials)
     given = array.transpose(*order)
     expected = [x[:24] for x in trials]
-    for found in (to_sequences(given), to_sequences(to_frame(list(given)))):
+    for found in (to_trials(given), to_trials(to_frame(list(given)))):
         same_bits(found, expected)
-        assert [x.attrs["performance"] for x in found] == array["trial"].values.tolist()
+        assert [x.attrs["trial"] for x in found] == array["trial"].values.tolist()
         assert list(found[0].columns) == NAMES
         assert found[0].index.tolist() == array["time"].values.tolist()
         assert found[0].attrs["units"] == "deg"
@@ -197,16 +197,16 @@ def test_the_time_of_a_labelled_array_is_that_of_warps(trials):
         "seconds", array
     )
     assert seconds["time"].max() == pytest.approx(23 / 50)
-    slower = to_sequences(array, frame_rate=25)
+    slower = to_trials(array, frame_rate=25)
     assert {len(x) for x in slower} == {12}
     np.testing.assert_allclose([x.index for x in slower], [np.arange(12) / 25] * 12)
 
 
 def test_one_trial_of_a_labelled_array(trials):
     array = labelled(trials)
-    (one,) = to_sequences(array.sel(trial="walk 3").transpose("angle", "time"))
+    (one,) = to_trials(array.sel(trial="walk 3").transpose("angle", "time"))
     same_bits([one], [trials[3][:24]])
-    assert one.attrs["performance"] == "walk 3"
+    assert one.attrs["trial"] == "walk 3"
     several = [array.isel(trial=[i]).squeeze() for i in range(12)]
     same_bits([sync().fit(several).transform(several)], [sync().fit(array).transform(array)])
 
@@ -216,39 +216,39 @@ def test_several_coordinates_name_a_trial(trials):
     array = (
         labelled(trials, person=people).drop_vars("trial").assign_coords(rep=("trial", range(12)))
     )
-    found = to_sequences(array.set_index(trial=["person", "rep"]))
-    assert found[5].attrs["performance"] == ("person 1", 5)
+    found = to_trials(array.set_index(trial=["person", "rep"]))
+    assert found[5].attrs["trial"] == ("person 1", 5)
     assert to_frame(found).index.names == ["person", "rep", "time"]
 
 
 def test_a_labelled_array_without_labels(trials):
     array = xr.DataArray(np.stack([x[:24] for x in trials]), dims=("trial", "sample", "angle"))
-    found = to_sequences(array)
+    found = to_trials(array)
     same_bits(found, [x[:24] for x in trials])
-    assert [x.attrs["performance"] for x in found] == list(range(12))
+    assert [x.attrs["trial"] for x in found] == list(range(12))
     assert list(found[0].columns) == [0, 1, 2]
     assert not hasattr(LinearSynchronizer().fit(array), "feature_names_in_")
 
 
 def test_frames_that_only_fill_up_a_labelled_array(trials):
     array = to_frame(trials, columns=NAMES).to_xarray().to_dataarray("angle")
-    array = array.transpose("performance", "frame", "angle")
+    array = array.transpose("trial", "frame", "angle")
     assert array.shape == (12, 35, 3)
     with pytest.raises(ValueError, match="is NaN from frame 24 to its end, frame 34"):
         sync().fit(array)
     padded = np.full((2, 35, 3), np.nan)
     padded[0], padded[1, :20] = trials[0][:1], trials[1][:20]
     padded[0] += np.sin(np.arange(35))[:, np.newaxis]
-    with pytest.raises(ValueError, match=r"Performance 1 is NaN from frame 20 .* list\(X\)"):
+    with pytest.raises(ValueError, match=r"Trial 1 is NaN from frame 20 .* list\(X\)"):
         sync().fit(padded)
     # An end that was not seen.
     assert np.isnan(sync().fit_transform(list(padded))[1, -5:]).all()
-    same_bits(to_sequences(to_frame(array).dropna(how="all")), trials)
+    same_bits(to_trials(to_frame(array).dropna(how="all")), trials)
 
 
 def test_frames_in_the_first_dimension_are_refused(trials):
     array = labelled(trials).transpose("time", "trial", "angle")
-    for call in (sync().fit, to_sequences, to_frame, LinearSynchronizer().fit):
+    for call in (sync().fit, to_trials, to_frame, LinearSynchronizer().fit):
         with pytest.raises(ValueError, match=r"X.transpose\('trial', 'time', 'angle'\)"):
             call(array)
 

@@ -1,4 +1,4 @@
-"""What tables say of their performances, frame rate, unit and vertical axis, is held together."""
+"""What tables say of their trials, frame rate, unit and vertical axis, is held together."""
 
 import warnings
 
@@ -16,16 +16,16 @@ from sklearn_motionsync import (
     MotionTracker,
     OnlineSynchronizer,
     Skeleton,
-    blend_performances,
+    blend_trials,
     to_frame,
-    to_sequences,
+    to_trials,
 )
 from sklearn_motionsync.datasets import make_bending
 
 from estimators import BODY, EVERY, NAMES, OF_TAKES, by_name, data_for, outputs
 
 RATE = {"frame_rate": 30}
-# Of two performances: what their tables say, and words of the warning or the error.
+# Of two trials: what their tables say, and words of the warning or the error.
 RATES = [
     ({"frame_rate": 120}, r"has 120 frames a second, and .* 30 frames a second.*frame_rate=30"),
     ({"frame_rate": 31}, "has 31 frames a second"),
@@ -67,10 +67,10 @@ def tables(estimator, *facts):
 )
 def test_rates_that_differ_are_warned_of(estimator, other, message):
     last = len(data_for(estimator)) - 1
-    with pytest.warns(UserWarning, match=f"Performance {last} {message}"):
+    with pytest.warns(UserWarning, match=f"Trial {last} {message}"):
         clone(estimator).fit(tables(estimator, RATE, other))
     fitted = clone(estimator).fit(tables(estimator, RATE))
-    with pytest.warns(UserWarning, match=f"Performance {last} has .*and the training set has 30"):
+    with pytest.warns(UserWarning, match=f"Trial {last} has .*and the training set has 30"):
         outputs(fitted, tables(estimator, RATE, other))
 
 
@@ -110,45 +110,45 @@ def test_the_index_tells_the_rate_of_the_rows():
     for df in seconds:
         df.attrs = {}
     fitted = LinearSynchronizer().fit([*X[:3], *seconds[3:]])
-    with pytest.warns(UserWarning, match=r"Performance 1 has 15 frames a second"):
+    with pytest.warns(UserWarning, match=r"Trial 1 has 15 frames a second"):
         fitted.transform([X[0], X[1].iloc[::2]])
-    table = to_frame([seconds[0], seconds[1].iloc[::3]], performances=["a", "b"])
-    with pytest.warns(UserWarning, match=r"Performance 1 \('b'\) has 10 frames a second"):
+    table = to_frame([seconds[0], seconds[1].iloc[::3]], trials=["a", "b"])
+    with pytest.warns(UserWarning, match=r"Trial 1 \('b'\) has 10 frames a second"):
         fitted.transform(table)
 
 
 def test_a_table_of_all_keeps_what_they_share():
     X = tables(ASpace(), RATE | {"units": "mm", "up": "y"}, {"frame_rate": 30, "up": "y"})
     assert to_frame(X).attrs == {"frame_rate": 30, "up": "y"}
-    with pytest.warns(UserWarning, match="Performance 5 has 60 frames a second"):
+    with pytest.warns(UserWarning, match="Trial 5 has 60 frames a second"):
         assert to_frame(tables(ASpace(), RATE, {"frame_rate": 60})).attrs == {}
-    with pytest.raises(ValueError, match="Performance 5 has the unit 'm'"):
+    with pytest.raises(ValueError, match="Trial 5 has the unit 'm'"):
         to_frame(tables(ASpace(), {"units": "mm"}, {"units": "m"}))
-    again = to_sequences(to_frame(X), frame_rate=15)
+    again = to_trials(to_frame(X), frame_rate=15)
     assert [df.attrs["frame_rate"] for df in again] == [15] * 6
 
 
 def test_a_known_rate_is_changed_without_times():
     x = pd.DataFrame({"a": np.arange(121) / 120}).set_axis(np.arange(121), axis=0)
-    x.attrs = {"frame_rate": 120, "events": [{"frame": 60.0}], "performance": "ann"}
+    x.attrs = {"frame_rate": 120, "events": [{"frame": 60.0}], "trial": "ann"}
     for rows, n_frames, event in (
         (slice(None), 31, 15),
         (slice(None, None, 2), 31, 15),
         (slice(12, None), 28, 12),
     ):
-        (slow,) = to_sequences(x.iloc[rows], frame_rate=30)
+        (slow,) = to_trials(x.iloc[rows], frame_rate=30)
         np.testing.assert_allclose(slow["a"], x["a"].iloc[rows].iloc[0] + np.arange(n_frames) / 30)
         assert slow.attrs["frame_rate"] == 30
-        assert slow.attrs["performance"] == "ann"
+        assert slow.attrs["trial"] == "ann"
         assert slow.attrs["events"] == [{"frame": event}]
-    (fast,) = to_sequences(slow, frame_rate=60)
+    (fast,) = to_trials(slow, frame_rate=60)
     assert len(fast) == 55
     dates = x.set_axis(pd.date_range("2020", periods=121, freq="10ms"), axis=0)
     dates.attrs = {}
-    assert len(to_sequences(dates, frame_rate=50)[0]) == 61
+    assert len(to_trials(dates, frame_rate=50)[0]) == 61
     dates.index = range(121)
     with pytest.raises(ValueError, match=r"frame_rate=50 needs time=, .* 121 rows"):
-        to_sequences(dates, frame_rate=50)
+        to_trials(dates, frame_rate=50)
 
 
 def test_a_rate_that_a_parameter_says_counts():
@@ -165,7 +165,7 @@ def test_times_replace_the_rate():
     tracker = MotionTracker(LinearSynchronizer(), n_particles=10).fit(X)
     for track in (online.track, tracker.track, tracker.smooth):
         track(fast, times=[np.arange(0, 30, 2.0)] * 2)
-        with pytest.warns(UserWarning, match="Performance 0 has 15 frames a second"):
+        with pytest.warns(UserWarning, match="Trial 0 has 15 frames a second"):
             track(fast)
     fast[1].attrs = {"units": "mm"}
     X[0].attrs["units"] = "m"
@@ -173,7 +173,7 @@ def test_times_replace_the_rate():
     # What a projection shows has a unit of its own.
     seen = [x.iloc[:, :2] for x in fast]
     tracker.track(seen, times=[np.arange(0, 30, 2.0)] * 2, projection=np.eye(45)[:2])
-    with pytest.raises(ValueError, match="Performance 1 has the unit 'mm'"):
+    with pytest.raises(ValueError, match="Trial 1 has the unit 'mm'"):
         tracker.track(fast, times=[np.arange(0, 30, 2.0)] * 2)
 
 
@@ -185,19 +185,17 @@ def test_a_refit_forgets_what_was_known():
         fitted.transform([x.set_axis(x.columns, axis=1) for x in tables(ASpace(), RATES[0][0])])
 
 
-def test_messages_keep_the_names_of_performances():
+def test_messages_keep_the_names_of_trials():
     X = tables(ASpace(), {"units": "m"}, {"units": "mm"})
     for df, name in zip(X, ["Pat", "Pia", "Paul", "Pip", "Per", "Pop"], strict=True):
-        df.attrs["performance"] = name
-    message = (
-        r"^Performance 5 \('Pop'\) has the unit 'mm', and performance 0 \('Pat'\) has the unit"
-    )
+        df.attrs["trial"] = name
+    message = r"^Trial 5 \('Pop'\) has the unit 'mm', and trial 0 \('Pat'\) has the unit"
     with pytest.raises(ValueError, match=message):
         to_frame(X)
 
 
 def test_more_than_one_difference_is_counted():
-    with pytest.warns(UserWarning, match=r"Performance 4 has 60 .* 30 frames a second\. 1 more"):
+    with pytest.warns(UserWarning, match=r"Trial 4 has 60 .* 30 frames a second\. 1 more"):
         LinearSynchronizer().fit(tables(ASpace(), RATE, {"frame_rate": 60}, {"frame_rate": 60}))
 
 
@@ -205,7 +203,7 @@ def test_bodies_hold_the_axis_of_their_skeleton_against_that_of_tables():
     (x,) = make_bending(1, random_state=0).data
     df = pd.DataFrame(x, columns=Skeleton.paper().column_names)
     df.attrs["up"] = "z"
-    with pytest.warns(UserWarning, match="Performance 0 has the vertical axis 'z' in its attrs"):
+    with pytest.warns(UserWarning, match="Trial 0 has the vertical axis 'z' in its attrs"):
         DirectionCosines(Skeleton.paper()).fit([df])
     df.attrs["up"] = "y"
     DirectionCosines(Skeleton.paper()).fit([df])
@@ -219,21 +217,21 @@ def test_pipelines_see_rates_at_their_first_step():
     steps = DirectionCosines(bunch.skeleton), ASpace(2), DenseSynchronizer(20), ActionModel()
     pipe = make_pipeline(*steps).fit(X)
     X[3].attrs["frame_rate"] = 200
-    with pytest.warns(UserWarning, match="Performance 3 has 200 frames a second"):
+    with pytest.warns(UserWarning, match="Trial 3 has 200 frames a second"):
         pipe.predict(X)
 
 
-def test_blends_have_the_facts_that_performances_share():
-    X = tables(ASpace(), RATE | {"units": "mm", "events": [{"frame": 3}], "performance": "a"})
+def test_blends_have_the_facts_that_trials_share():
+    X = tables(ASpace(), RATE | {"units": "mm", "events": [{"frame": 3}], "trial": "a"})
     fitted = LinearSynchronizer().fit(X)
-    assert blend_performances(fitted, X, {0: 0.5, 1: 0.5}).attrs == {**RATE, "units": "mm"}
+    assert blend_trials(fitted, X, {0: 0.5, 1: 0.5}).attrs == {**RATE, "units": "mm"}
     X[1].attrs["frame_rate"] = 60
-    with pytest.warns(UserWarning, match="Performance 1 has 60 frames a second"):
-        mixed = blend_performances(fitted, X, {0: 0.5, 1: 0.5})
+    with pytest.warns(UserWarning, match="Trial 1 has 60 frames a second"):
+        mixed = blend_trials(fitted, X, {0: 0.5, 1: 0.5})
     assert mixed.attrs == {"frame_rate": None, "units": "mm"}
     X[1].attrs = {"units": "m"}
-    with pytest.raises(ValueError, match="Performance 1 has the unit 'm', and performance 0"):
-        blend_performances(fitted.match(X[:1] * 6), X, {0: 0.5, 1: 0.5})
+    with pytest.raises(ValueError, match="Trial 1 has the unit 'm', and trial 0"):
+        blend_trials(fitted.match(X[:1] * 6), X, {0: 0.5, 1: 0.5})
 
 
 UNITS = {"force": "N", "moment": "Nm", "emg": "V"}
@@ -253,8 +251,6 @@ def test_units_of_columns_are_compared_by_name():
     kept = channels(other, ["N", "Nm", "V"], channels=first)
     LinearSynchronizer().fit([channels(first), channels(other), kept, channels(first)])
     for wrong in (["Nm", "N", "V"], ["N", "N", "V"], ["N", "Nmm", "V"]):
-        with pytest.raises(
-            ValueError, match=r"Performance 1 has the unit .* and performance 0 has"
-        ):
+        with pytest.raises(ValueError, match=r"Trial 1 has the unit .* and trial 0 has"):
             LinearSynchronizer().fit([channels(first), channels(first, wrong)])
     assert len(to_frame([channels(first, ["N"] * 3), channels(first, "N")])) == 80

@@ -1,4 +1,4 @@
-"""Tables to performances with labels, in order of an even time, and back."""
+"""Tables to trials with labels, in order of an even time, and back."""
 
 import datetime as dt
 import io
@@ -20,7 +20,7 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     find_departures,
     to_frame,
-    to_sequences,
+    to_trials,
 )
 from sklearn_motionsync.metrics import least_squares
 
@@ -49,7 +49,7 @@ def table():
 
 @pytest.fixture
 def walks(table):
-    return to_sequences(table, by=KEYS, time="time")
+    return to_trials(table, by=KEYS, time="time")
 
 
 def labels_of(table, levels=(0, 1)):
@@ -60,11 +60,11 @@ def labels_of(table, levels=(0, 1)):
 
 
 @pytest.mark.parametrize("levels", [[], ["subject"], ["trial", "time"], [*KEYS, "time"]])
-def test_the_time_puts_frames_in_order_and_keys_name_performances(table, levels):
+def test_the_time_puts_frames_in_order_and_keys_name_trials(table, levels):
     df = table.set_index(levels) if levels else table
-    found = to_sequences(df, by=KEYS, time="time")
+    found = to_trials(df, by=KEYS, time="time")
     keys = list(table[KEYS].drop_duplicates().itertuples(index=False, name=None))
-    assert [x.attrs["performance"] for x in found] == keys
+    assert [x.attrs["trial"] for x in found] == keys
     for x, (subject, k) in zip(found, keys, strict=True):
         rows = table[(table["subject"] == subject) & (table["trial"] == k)].sort_values("time")
         pd.testing.assert_frame_equal(x, rows.set_index("time")[["knee", "hip"]])
@@ -73,37 +73,37 @@ def test_the_time_puts_frames_in_order_and_keys_name_performances(table, levels)
 
 
 def test_labels_are_plain(walks):
-    assert repr(walks[0].attrs["performance"][1]) in ("1", "2")
-    (numbered,) = to_sequences(pd.DataFrame({"k": [3, 3], "x": [0.0, 1]}), by="k")
-    assert repr(numbered.attrs["performance"]) == "3"
+    assert repr(walks[0].attrs["trial"][1]) in ("1", "2")
+    (numbered,) = to_trials(pd.DataFrame({"k": [3, 3], "x": [0.0, 1]}), by="k")
+    assert repr(numbered.attrs["trial"]) == "3"
 
 
 def test_the_way_back(table, walks):
     expected = table.set_index([*KEYS, "time"]).sort_index()
     back = to_frame(walks)
-    assert labels_of(back) == [x.attrs["performance"] for x in walks]
+    assert labels_of(back) == [x.attrs["trial"] for x in walks]
     pd.testing.assert_frame_equal(back.sort_index(), expected)
-    for again, x in zip(to_sequences(back), walks, strict=True):
+    for again, x in zip(to_trials(back), walks, strict=True):
         pd.testing.assert_frame_equal(again, x)
-        assert again.attrs["performance"] == x.attrs["performance"]
+        assert again.attrs["trial"] == x.attrs["trial"]
 
 
 def test_labels_given_to_a_frame_name_their_levels(walks):
     some = walks[:2]
-    assert to_frame(some, performances=["a", "b"]).index.names == ["performance", "time"]
+    assert to_frame(some, trials=["a", "b"]).index.names == ["trial", "time"]
     tuples = [("x", 1), ("x", 2)]
-    assert to_frame(some, performances=tuples).index.nlevels == 2
+    assert to_frame(some, trials=tuples).index.nlevels == 2
     index = pd.MultiIndex.from_tuples(tuples, names=["subject", "take"])
-    assert to_frame(some, performances=index).index.names == ["subject", "take", "time"]
-    assert to_frame(some, performances=pd.Index([4, 5], name="take")).index.names[0] == "take"
-    bare = to_frame([x.to_numpy() for x in some], performances=some)
+    assert to_frame(some, trials=index).index.names == ["subject", "take", "time"]
+    assert to_frame(some, trials=pd.Index([4, 5], name="take")).index.names[0] == "take"
+    bare = to_frame([x.to_numpy() for x in some], trials=some)
     assert bare.index.names == [*KEYS, "frame"]
 
 
 @pytest.mark.parametrize("as_table", [False, True])
 def test_pandas_outputs_have_the_levels_of_the_table(walks, as_table):
     X = to_frame(walks) if as_table else walks
-    labels = [x.attrs["performance"] for x in walks]
+    labels = [x.attrs["trial"] for x in walks]
     before = ASpace(2).set_output(transform="pandas").fit_transform(X)
     pd.testing.assert_index_equal(before.index, to_frame(walks).index)
     for estimator in (LinearSynchronizer(20), make_pipeline(ASpace(2), DenseSynchronizer(20))):
@@ -139,7 +139,7 @@ class LabelRecorder(TransformerMixin, BaseEstimator):
 
 
 def test_lists_keep_labels_through_cross_validation(walks):
-    labels = [x.attrs["performance"] for x in walks]
+    labels = [x.attrs["trial"] for x in walks]
     pipe = make_pipeline(LabelRecorder(), LinearSynchronizer(10))
 
     def score(estimator, X, y=None):
@@ -158,7 +158,7 @@ def test_lists_keep_labels_through_cross_validation(walks):
         assert labels[2:] in LabelRecorder.seen
 
 
-def test_copies_of_a_performance_are_numbered(walks):
+def test_copies_of_a_trial_are_numbered(walks):
     """Labels that come twice, or not throughout, name nothing."""
     for X in ([walks[0], walks[0]], [walks[0], walks[1].to_numpy()], [walks[0] * 1, walks[0]]):
         X = [x.iloc[:20] if hasattr(x, "iloc") else x[:20] for x in X]
@@ -167,7 +167,7 @@ def test_copies_of_a_performance_are_numbered(walks):
         assert list(out.index.unique(0)) == [0, 1]
 
 
-@pytest.mark.parametrize("attrs", [{"performance": ["a"]}, {"performance": "a", "levels": 3}])
+@pytest.mark.parametrize("attrs", [{"trial": ["a"]}, {"trial": "a", "levels": 3}])
 def test_attrs_of_other_kinds_are_no_labels(attrs):
     x = pd.DataFrame({"knee": [0.0, 1.0]})
     x.attrs = attrs
@@ -176,12 +176,12 @@ def test_attrs_of_other_kinds_are_no_labels(attrs):
 
 def test_messages_name_the_label(walks):
     bad = [x.copy() for x in walks]
-    label = bad[3].attrs["performance"]
+    label = bad[3].attrs["trial"]
     bad[3].iloc[4, 1] = np.inf
     for X in (bad, to_frame(bad)):
         with pytest.raises(ValueError, match="is infinity") as caught:
             ASpace().fit(X)
-        where = f"Performance 3 {label!r}, frame 4 (0.08), feature 1 ('hip')"
+        where = f"Trial 3 {label!r}, frame 4 (0.08), feature 1 ('hip')"
         assert str(caught.value).startswith(where)
 
 
@@ -189,24 +189,24 @@ def test_departures_carry_the_label(walks):
     """Also behind steps that give arrays."""
     moved = [x.copy() for x in walks]
     moved[1].iloc[10:15] += 5
-    label = moved[1].attrs["performance"]
+    label = moved[1].attrs["trial"]
     for X in (walks, to_frame(walks)):
         model = make_pipeline(ASpace(2), LinearSynchronizer(30), ActionModel()).fit(X)
         given = moved if X is walks else to_frame(moved)
         found = find_departures(model, given)
-        assert set(found["performance"]) <= {x.attrs["performance"] for x in walks}
-        assert set(found.loc[found["rare"], "performance"]) == {label}
+        assert set(found["trial"]) <= {x.attrs["trial"] for x in walks}
+        assert set(found.loc[found["rare"], "trial"]) == {label}
     detector = ActionDetector(make_pipeline(ASpace(2), DenseSynchronizer(30), ActionModel()))
     report = detector.fit(walks).report(moved)
     assert report.index.names == KEYS
-    assert report.index.tolist() == [x.attrs["performance"] for x in walks]
+    assert report.index.tolist() == [x.attrs["trial"] for x in walks]
 
 
 def test_measures_take_tables_of_several_levels(walks):
     linear = LinearSynchronizer(20).set_output(transform="pandas").fit(walks)
     dense = DenseSynchronizer(20).set_output(transform="pandas").fit(walks)
     tables = linear.transform(walks), dense.transform(walks)
-    arrays = [np.stack(to_sequences(df)) for df in tables]
+    arrays = [np.stack(to_trials(df)) for df in tables]
     assert least_squares(*tables) == least_squares(*arrays)
 
 
@@ -216,7 +216,7 @@ def test_measures_take_tables_of_several_levels(walks):
 def test_uneven_times_are_resampled_on_straight_lines():
     rng = np.random.default_rng(0)
     time = np.arange(60) / 50 + rng.uniform(-0.009, 0.009, 60)
-    (x,) = to_sequences(trial_of("a", 1, time), by=KEYS, time="time")
+    (x,) = to_trials(trial_of("a", 1, time), by=KEYS, time="time")
     assert x.attrs["resampled"]
     assert (x.index[0], x.index[-1]) == (time[0], time[-1])
     steps = np.diff(x.index)
@@ -231,7 +231,7 @@ def test_uneven_times_are_resampled_on_straight_lines():
 def test_jitter_is_resampled_too(jitter):
     time = np.arange(9.0)
     time[4] += jitter
-    (x,) = to_sequences(pd.DataFrame({"t": time, "x": 3 * time}), time="t")
+    (x,) = to_trials(pd.DataFrame({"t": time, "x": 3 * time}), time="t")
     np.testing.assert_allclose(x.index, np.linspace(0, 8, len(x)))
     np.testing.assert_allclose(x["x"], 3 * x.index)
 
@@ -240,10 +240,10 @@ def test_jitter_is_resampled_too(jitter):
 def test_rounded_times_are_even(rate, unit):
     """Of a recording whose times are written to the millisecond every number is kept."""
     time = unit * np.round(np.arange(400) / rate, 3)
-    (x,) = to_sequences(pd.DataFrame({"t": time, "x": np.sin(time)}), time="t")
+    (x,) = to_trials(pd.DataFrame({"t": time, "x": np.sin(time)}), time="t")
     np.testing.assert_array_equal(x["x"], np.sin(time))
     assert not x.attrs["resampled"]
-    (x,) = to_sequences(x.reset_index(), time="t", frame_rate=rate / unit)
+    (x,) = to_trials(x.reset_index(), time="t", frame_rate=rate / unit)
     assert not x.attrs["resampled"]
 
 
@@ -261,7 +261,7 @@ def test_rounded_times_are_even(rate, unit):
 )
 def test_coarse_times_are_even(time):
     df = pd.DataFrame({"t": time, "x": np.sin(time.astype(float))})
-    (x,) = to_sequences(df, time="t")
+    (x,) = to_trials(df, time="t")
     np.testing.assert_array_equal(x["x"], df["x"])
     assert not x.attrs["resampled"]
 
@@ -270,14 +270,14 @@ def test_coarse_times_are_even(time):
 @pytest.mark.parametrize(("rate", "digits"), [(60, 2), (100, 2), (240, 3)])
 def test_lost_frames_are_no_rounding(rate, digits, lost):
     time = np.delete(np.round(np.arange(60) / rate, digits), lost)
-    (x,) = to_sequences(pd.DataFrame({"t": time, "x": time}), time="t", max_gap_time=3 / rate)
+    (x,) = to_trials(pd.DataFrame({"t": time, "x": time}), time="t", max_gap_time=3 / rate)
     assert x.attrs["resampled"]
 
 
 @pytest.mark.parametrize(("rate", "n_frames"), [(25, 26), (100, 101), (30, 31)])
 def test_a_frame_rate_is_given(rate, n_frames):
     time = np.arange(51) / 50
-    (x,) = to_sequences(pd.DataFrame({"t": time, "x": time**2}), time="t", frame_rate=rate)
+    (x,) = to_trials(pd.DataFrame({"t": time, "x": time**2}), time="t", frame_rate=rate)
     np.testing.assert_allclose(x.index, np.arange(n_frames) / rate, atol=1e-12)
     np.testing.assert_allclose(x["x"], np.interp(x.index, time, time**2))
 
@@ -287,8 +287,8 @@ def test_gaps_are_bridged_up_to_a_size():
     df = pd.DataFrame({"t": time, "x": time, "k": "a"})
     for max_gap_time in (None, 2):
         with pytest.raises(ValueError, match=r"'a' has a gap from 9 to 12.*max_gap_time=3,"):
-            to_sequences(df, by="k", time="t", max_gap_time=max_gap_time)
-    (x,) = to_sequences(df, by="k", time="t", max_gap_time=3)
+            to_trials(df, by="k", time="t", max_gap_time=max_gap_time)
+    (x,) = to_trials(df, by="k", time="t", max_gap_time=3)
     assert x["x"].tolist() == x.index.tolist() == list(range(20))
 
 
@@ -298,9 +298,9 @@ def test_the_gap_of_the_message_is_large_enough():
         time = np.cumsum(rng.exponential(size=30)) * 10.0 ** rng.integers(-6, 6)
         df = pd.DataFrame({"t": time, "x": time})
         with pytest.raises(ValueError, match="max_gap_time") as caught:
-            to_sequences(df, time="t")
+            to_trials(df, time="t")
         gap = float(str(caught.value).split("max_gap_time=")[1].split(",")[0])
-        assert to_sequences(df, time="t", max_gap_time=gap)
+        assert to_trials(df, time="t", max_gap_time=gap)
 
 
 def test_dates_and_durations_become_seconds():
@@ -315,7 +315,7 @@ def test_dates_and_durations_become_seconds():
         pd.to_timedelta(seconds, unit="s").to_pytimedelta(),
     ):
         df = pd.DataFrame({"t": time, "x": seconds}).iloc[::-1]
-        (x,) = to_sequences(df, time="t")
+        (x,) = to_trials(df, time="t")
         assert x.index.tolist() == x["x"].tolist() == seconds.tolist()
 
 
@@ -323,7 +323,7 @@ def test_gaps_in_features_stay_gaps():
     time = np.r_[0:5, 5.3, 6:10]
     df = pd.DataFrame({"t": time, "x": time, "y": 2 * time}).astype({"y": np.float32})
     df.loc[2, "x"] = np.nan
-    (x,) = to_sequences(df, time="t")
+    (x,) = to_trials(df, time="t")
     assert x["x"].isna().any()
     assert not x["y"].isna().any()
     assert (x["x"].dtype, x["y"].dtype) == (np.float64, np.float32)
@@ -331,36 +331,36 @@ def test_gaps_in_features_stay_gaps():
         CycleSegmenter().fit([x])
 
 
-def test_one_performance_by_its_time_alone():
+def test_one_trial_by_its_time_alone():
     time = np.arange(9) / 10
-    (x,) = to_sequences(pd.DataFrame({"t": time[::-1], "x": range(9)}), time="t")
+    (x,) = to_trials(pd.DataFrame({"t": time[::-1], "x": range(9)}), time="t")
     assert x["x"].tolist() == list(range(8, -1, -1))
-    assert x.attrs["performance"] == 0
-    assert to_frame([x]).index.names == ["performance", "t"]
+    assert x.attrs["trial"] == 0
+    assert to_frame([x]).index.names == ["trial", "t"]
 
 
 def test_a_time_among_the_levels_goes_with_the_others(table, walks):
     indexed = table.set_index([*KEYS, "time"])
     for df in (indexed, indexed.reset_index("time").set_index("hip", append=True)):
         expected = [x[["knee"]] for x in walks]
-        found = to_sequences(df, time="time")
+        found = to_trials(df, time="time")
         for x, y in zip(found, expected, strict=True):
             pd.testing.assert_frame_equal(x[["knee"]], y)
     one = table[table["subject"] == "ann"].set_index("trial").drop(columns="subject")
-    assert [x.attrs["performance"] for x in to_sequences(one, time="time")] == [1, 2]
+    assert [x.attrs["trial"] for x in to_trials(one, time="time")] == [1, 2]
 
 
 def test_attributes_of_the_table_stay(table):
     table.attrs["frame_rate"] = 50
-    assert all(x.attrs["frame_rate"] == 50 for x in to_sequences(table, by=KEYS, time="time"))
+    assert all(x.attrs["frame_rate"] == 50 for x in to_trials(table, by=KEYS, time="time"))
 
 
 def test_levels_of_a_wide_file_are_keys(tmp_path):
     """pandas keeps every column that it reads apart, and warns when one more is inserted."""
     pd.DataFrame(np.random.default_rng(0).random((9, 120))).to_csv(tmp_path / "a.csv")
     read = {name: pd.read_csv(tmp_path / "a.csv", index_col=0) for name in "ab"}
-    found = to_sequences(pd.concat(read, names=["trial", "t"]), time="t")
-    assert [(x.attrs["performance"], x.shape) for x in found] == [("a", (9, 120)), ("b", (9, 120))]
+    found = to_trials(pd.concat(read, names=["trial", "t"]), time="t")
+    assert [(x.attrs["trial"], x.shape) for x in found] == [("a", (9, 120)), ("b", (9, 120))]
 
 
 # -- clock and events of a recording ------------------------------------------------------------
@@ -382,7 +382,7 @@ def test_uneven_times_that_were_made_even_are_a_frame_rate():
     seconds = 2 + np.delete(np.arange(101) / 100, [3, 50])
     df = recording(seconds, times=seconds.tolist(), events=events_at(2.0, 48.5, None, -3.0))
     for time in (seconds, seconds - 2, 1000 * seconds, pd.to_timedelta(seconds, unit="s")):
-        (x,) = to_sequences(df.assign(time=time), time="time", max_gap_time=1e5)
+        (x,) = to_trials(df.assign(time=time), time="time", max_gap_time=1e5)
         assert x.attrs["frame_rate"] == 100
         assert x.attrs["first_time"] == 2
         assert "times" not in x.attrs
@@ -395,10 +395,10 @@ def test_uneven_times_that_were_made_even_are_a_frame_rate():
 def test_another_frame_rate_is_that_of_the_recording():
     df = recording(np.arange(101) / 100, frame_rate=100.0, events=events_at(30.0))
     df = df.assign(ms=np.arange(101) * 10.0)
-    (x,) = to_sequences(df, time="ms", frame_rate=0.05)
+    (x,) = to_trials(df, time="ms", frame_rate=0.05)
     assert x.attrs["frame_rate"] == 50
     assert x.attrs["events"] == events_at(15.0)
-    (x,) = to_sequences(df, time="ms")
+    (x,) = to_trials(df, time="ms")
     assert x.attrs["frame_rate"] == 100
     assert x.attrs["events"] == events_at(30.0)
 
@@ -408,7 +408,7 @@ def test_parts_of_a_recording_have_their_own_times(time):
     seconds = 2 + np.cumsum([0, 1, 3, 1, 1, 2, 1, 1, 1, 4]) / 10
     df = recording(seconds, times=seconds.tolist(), events=events_at(1.5, 6.0), first_frame=7)
     df = df.assign(cycle=[0] * 4 + [1] * 6, frame=range(10))
-    first, second = to_sequences(df, by="cycle", time=time)
+    first, second = to_trials(df, by="cycle", time=time)
     assert first.attrs["times"] == seconds[:4].tolist()
     assert second.attrs["times"] == seconds[4:].tolist()
     assert [x.attrs["first_time"] for x in (first, second)] == [2, seconds[4]]
@@ -422,7 +422,7 @@ def test_events_stay_at_their_times_between_and_beyond_uneven_frames(frame):
     """On a straight line between frames, and at the mean step beyond them."""
     seconds = 2 + np.cumsum(np.random.default_rng(0).uniform(0.009, 0.016, 40))
     df = recording(seconds, times=seconds.tolist(), events=events_at(frame))
-    (x,) = to_sequences(df.assign(t=seconds), time="t")
+    (x,) = to_trials(df.assign(t=seconds), time="t")
     assert x.attrs["resampled"]
     pace = (seconds[-1] - seconds[0]) / 39
     time = np.interp(frame, np.arange(40), seconds)
@@ -432,25 +432,25 @@ def test_events_stay_at_their_times_between_and_beyond_uneven_frames(frame):
     assert event["frame"] == pytest.approx((time - seconds[0]) / step, abs=1e-4)
 
 
-def test_a_performance_of_one_row_has_a_clock():
+def test_a_trial_of_one_row_has_a_clock():
     df = pd.DataFrame({"k": ["a", "a", "b"], "t": [0.0, 0.5, 3.0], "knee": [1.0, 2, 3]})
-    found = to_sequences(df, by="k", time="t")
+    found = to_trials(df, by="k", time="t")
     assert [x.attrs["clock"] for x in found] == [(0.0, 0.5), (3.0, 1.0)]
 
 
 def test_levels_without_a_name_have_a_number():
     index = pd.MultiIndex.from_product([["a", "b"], range(4)])
     df = pd.DataFrame({"t": [0.0, 1, 2, 3] * 2, "knee": np.arange(8.0)}, index=index)
-    for given in ({"by": "performance"}, {"by": ["performance"], "time": "t"}, {"time": "t"}):
-        found = to_sequences(df, **given)
-        assert [x.attrs["performance"] for x in found] == ["a", "b"]
-        assert found[0].attrs["levels"][0] == "performance"
+    for given in ({"by": "trial"}, {"by": ["trial"], "time": "t"}, {"time": "t"}):
+        found = to_trials(df, **given)
+        assert [x.attrs["trial"] for x in found] == ["a", "b"]
+        assert found[0].attrs["levels"][0] == "trial"
 
 
 def test_a_recording_keeps_its_name():
-    df = recording(np.arange(9.0), performance="walk1", levels=["recording", "frame"])
-    (x,) = to_sequences(df.assign(t=np.arange(9)), time="t")
-    assert (x.attrs["performance"], x.attrs["levels"]) == ("walk1", ("recording", "t"))
+    df = recording(np.arange(9.0), trial="walk1", levels=["recording", "frame"])
+    (x,) = to_trials(df.assign(t=np.arange(9)), time="t")
+    assert (x.attrs["trial"], x.attrs["levels"]) == ("walk1", ("recording", "t"))
 
 
 # -- errors -----------------------------------------------------------------------------------
@@ -467,12 +467,12 @@ def put(column, value, row=3):
     return change
 
 
-CALL = "to_sequences(df, by=..., time=...)"
+CALL = "to_trials(df, by=..., time=...)"
 REFUSED = [
     # change of the table, arguments, words
     (put("subject", None), BY, ["'subject'", "row 3", "Drop these rows"]),
     (put("trial", np.nan), BY, ["'trial'", "1 of", "row 3"]),
-    (put("time", np.nan), BY, ["time of performance", "row 3", "df.dropna(subset=['time'])"]),
+    (put("time", np.nan), BY, ["time of trial", "row 3", "df.dropna(subset=['time'])"]),
     (put("time", np.inf), BY, ["infinite", "row 3"]),
     (lambda df: pd.concat([df, df[:1]]), BY, ["twice", "drop_duplicates"]),
     (lambda df: df, {"by": "subject", "time": "time"}, ["twice", "by="]),
@@ -484,7 +484,7 @@ REFUSED = [
     (lambda df: df.astype({"time": str}), BY, ["text", "pd.to_datetime"]),
     (lambda df: df.assign(knee="0,5"), BY, ["'knee'", "'0,5'", "decimal=','"]),
     (put("knee", "-"), BY, ["'-'", "pd.to_numeric(column, errors='coerce')"]),
-    (lambda df: df.assign(time=dt.time(0, 1)), BY, ["time of performance", "durations (time)"]),
+    (lambda df: df.assign(time=dt.time(0, 1)), BY, ["time of trial", "durations (time)"]),
     (lambda df: df[:0], BY, ["no rows"]),
     (lambda df: df, {"by": ["subject", "take"]}, ["['take']", "'trial'", CALL]),
     (lambda df: df, {"by": []}, ["no column", CALL]),
@@ -515,23 +515,23 @@ REFUSED = [
 def test_index_with_the_frame_first_is_refused(time):
     wide = pd.DataFrame({time: np.arange(30), "knee_1": np.ones(30), "knee_2": np.zeros(30)})
     long = pd.wide_to_long(wide, ["knee"], i=time, j="trial", sep="_")
-    for take in (to_sequences, ASpace().fit, DenseSynchronizer().fit):
+    for take in (to_trials, ASpace().fit, DenseSynchronizer().fit):
         with pytest.raises(ValueError, match=rf"the frame in its last level, and '{time}' is"):
             take(long)
-    assert [len(x) for x in to_sequences(long, by=["trial"], time=time)] == [30, 30]
+    assert [len(x) for x in to_trials(long, by=["trial"], time=time)] == [30, 30]
 
 
 @pytest.mark.parametrize(("change", "given", "words"), REFUSED, ids=range(len(REFUSED)))
-def test_to_sequences_refuses(table, change, given, words):
+def test_to_trials_refuses(table, change, given, words):
     with pytest.raises((TypeError, ValueError)) as caught:
-        to_sequences(change(table), **given)
+        to_trials(change(table), **given)
     assert [word for word in words if word not in str(caught.value)] == [], str(caught.value)
     assert len(str(caught.value)) < 1000
 
 
 def test_missing_key_in_an_index_is_refused(table):
     df = put("subject", None)(table).set_index([*KEYS, "time"]).sort_index()
-    for take in (to_sequences, ASpace().fit):
+    for take in (to_trials, ASpace().fit):
         with pytest.raises(ValueError, match="'subject' is missing"):
             take(df)
 
@@ -540,7 +540,7 @@ def test_missing_key_in_an_index_is_refused(table):
 
 
 def test_polars_tables_give_the_same(table, walks):
-    found = to_sequences(pl.DataFrame(table.to_dict("list")), **BY)
+    found = to_trials(pl.DataFrame(table.to_dict("list")), **BY)
     for x, y in zip(found, walks, strict=True):
         pd.testing.assert_frame_equal(x, y)
         assert x.attrs == y.attrs
@@ -552,12 +552,12 @@ def test_polars_dates_and_missing_values(table):
         {"subject": ["a"] * 5, "t": (seconds * 1000).astype("M8[ms]"), "x": [1, 2, None, 4, 5]},
         schema_overrides={"subject": pl.Categorical},
     )
-    (x,) = to_sequences(df, by="subject", time="t")
+    (x,) = to_trials(df, by="subject", time="t")
     assert x.index.tolist() == seconds.tolist()
     assert x["x"].isna().tolist() == [False, False, True, False, False]
 
 
-def test_lists_of_polars_frames_are_performances(walks):
+def test_lists_of_polars_frames_are_trials(walks):
     X = [pl.DataFrame(x.to_dict("list")) for x in walks]
     sync = DenseSynchronizer(20).fit(X)
     assert sync.feature_names_in_.tolist() == ["knee", "hip"]
@@ -573,7 +573,7 @@ def test_lists_of_polars_frames_are_performances(walks):
 
 def test_a_long_polars_table_is_not_read_row_by_row(table):
     df = pl.DataFrame(table.drop(columns=KEYS).to_dict("list"))
-    with pytest.raises(ValueError, match=r"to_sequences\(df, by=..., time=...\)"):
+    with pytest.raises(ValueError, match=r"to_trials\(df, by=..., time=...\)"):
         DenseSynchronizer().fit(df)
 
 
@@ -584,17 +584,17 @@ def test_split_of_several_tables_is_refused(table):
     parts = {name: part.drop(columns=KEYS) for name, part in table.groupby("subject")}
     for several in (parts, list(parts.values())):
         with pytest.raises(ValueError, match=r"Several tables make one: pd\.concat\(tables"):
-            to_sequences(several, time="time")
+            to_trials(several, time="time")
 
 
-def test_a_level_named_frame_may_tell_performances_apart():
+def test_a_level_named_frame_may_tell_trials_apart():
     """Rows are then numbered under another name, and the way there and back keeps both."""
     df = pd.DataFrame({"frame": [1, 1, 2, 2, 2], "knee": np.arange(5.0)})
-    found = to_sequences(df, by="frame")
+    found = to_trials(df, by="frame")
     out = to_frame(found)
     assert out.index.names == ["frame", "row"]
     assert out.index.tolist() == [(1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
-    assert to_frame(to_sequences(out)).equals(out)
+    assert to_frame(to_trials(out)).equals(out)
 
 
 def test_an_index_of_uneven_times_is_warned_of():
@@ -605,22 +605,22 @@ def test_an_index_of_uneven_times_is_warned_of():
     words = (
         r"'bob'.*, level 'time' .*: from 0.12 to 0.2 it is 0.08, mostly 0.02.*time='time'\) makes"
     )
-    for take in (to_sequences, LinearSynchronizer(9).fit):
+    for take in (to_trials, LinearSynchronizer(9).fit):
         with pytest.warns(UserWarning, match=words):
             take(df)
     # No warning of even times, of missing frames, or of times that were made even.
-    assert len(to_sequences(df.loc[["ann"]])) == 1
+    assert len(to_trials(df.loc[["ann"]])) == 1
     frames = df.loc[["bob"]].set_axis(
         pd.MultiIndex.from_product([["bob"], np.delete(range(20), [7, 8, 9])])
     )
-    assert len(to_sequences(frames)) == 1
-    assert len(to_sequences(to_frame(to_sequences(df, time="time", max_gap_time=0.1)))) == 2
+    assert len(to_trials(frames)) == 1
+    assert len(to_trials(to_frame(to_trials(df, time="time", max_gap_time=0.1)))) == 2
     dates = df.rename(lambda t: pd.Timestamp("2024-05-01") + pd.Timedelta(seconds=t), level="time")
     with pytest.warns(UserWarning, match="'bob'.*, level 'time'"):
-        to_sequences(dates)
+        to_trials(dates)
 
 
-# -- to_frame, and an index of performance and frame --------------------------------------------
+# -- to_frame, and an index of trial and frame --------------------------------------------
 
 
 @pytest.fixture
@@ -633,23 +633,23 @@ def frame():
 
 @pytest.mark.parametrize("order", [[0, 1, 2, 3, 4], [0, 2, 1, 3, 4]])
 def test_index_splits_in_order_of_appearance_and_back(frame, order):
-    first, second = to_sequences(frame.iloc[order])
+    first, second = to_trials(frame.iloc[order])
     assert first["x"].tolist() == [1, 2]
     assert second.index.tolist() == [3, 5, 9]
-    back = to_frame([first, second], performances=["b", "a"])
-    pd.testing.assert_frame_equal(back, frame.rename_axis(["performance", "t"]))
+    back = to_frame([first, second], trials=["b", "a"])
+    pd.testing.assert_frame_equal(back, frame.rename_axis(["trial", "t"]))
 
 
 def test_arrays_with_gaps_survive_the_round_trip():
     X = [np.array([[1.0, 2], [np.nan, 4], [5, 6]]), np.ones((2, 2))]
     df = to_frame(X)
-    assert df.index.names == ["performance", "frame"]
-    for a, b in zip(to_sequences(df), X, strict=True):
+    assert df.index.names == ["trial", "frame"]
+    for a, b in zip(to_trials(df), X, strict=True):
         np.testing.assert_array_equal(a, b)
 
 
 def test_rows_without_a_time_keep_their_order(table):
-    found = to_sequences(table.drop(columns=["time", "trial"]), by="subject")
+    found = to_trials(table.drop(columns=["time", "trial"]), by="subject")
     sizes = table.groupby("subject", sort=False).size()
     assert [x.index.tolist() for x in found] == [list(range(n)) for n in sizes]
 
@@ -657,15 +657,15 @@ def test_rows_without_a_time_keep_their_order(table):
 @pytest.mark.parametrize("labels", [["a"], ["a", "a"], ["a", "b", "c"]])
 def test_to_frame_refuses_labels_that_do_not_fit(labels):
     with pytest.raises(ValueError, match="2 different labels"):
-        to_frame([np.zeros((2, 1))] * 2, performances=labels)
+        to_frame([np.zeros((2, 1))] * 2, trials=labels)
 
 
 @pytest.mark.parametrize("shape", [(1, 2), (0, 2), (5, 0)])
-def test_performances_need_frames_and_features(shape):
+def test_trials_need_frames_and_features(shape):
     for take in (to_frame, DenseSynchronizer().fit):
-        with pytest.raises(ValueError, match=r"Performance 1 .* at least 2 frames and 1 feature"):
+        with pytest.raises(ValueError, match=r"Trial 1 .* at least 2 frames and 1 feature"):
             take([np.zeros((5, 2)), np.zeros(shape)])
-    with pytest.raises(ValueError, match="0 performances"):
+    with pytest.raises(ValueError, match="0 trials"):
         to_frame([])
 
 
@@ -684,11 +684,11 @@ OF_UNITS = {
     "list of tables": lambda files: DenseSynchronizer().fit(files),
     "arrays of tables": lambda files: DenseSynchronizer().fit([df.to_numpy() for df in files]),
     "an index": lambda files: ASpace().fit(pd.concat(files, keys=[*"abc"], names=["trial", "row"])),
-    "one file": lambda files: to_sequences(files[0], time="time"),
-    "several in one": lambda files: to_sequences(
+    "one file": lambda files: to_trials(files[0], time="time"),
+    "several in one": lambda files: to_trials(
         pd.concat([df.assign(trial=i) for i, df in enumerate(files)], ignore_index=True), **BY_TRIAL
     ),
-    "polars": lambda files: to_sequences(pl.DataFrame(files[0].to_dict("list")), time="time"),
+    "polars": lambda files: to_trials(pl.DataFrame(files[0].to_dict("list")), time="time"),
 }
 
 
@@ -697,7 +697,7 @@ def test_a_row_of_units_is_told_of(way):
     with pytest.raises(ValueError, match=UNITS) as caught:
         OF_UNITS[way]([exported(i) for i in range(3)])
     assert "read_motion" not in str(caught.value)
-    assert len(to_sequences(exported(0, skiprows=[1]), time="time")[0]) == 40
+    assert len(to_trials(exported(0, skiprows=[1]), time="time")[0]) == 40
 
 
 @pytest.mark.parametrize(
@@ -714,7 +714,7 @@ def test_a_row_of_units_is_told_of(way):
 def test_other_text_is_neither_units_nor_a_label(column):
     df = exported(0, skiprows=[1]).assign(knee=column)
     with pytest.raises(ValueError, match="column 'knee'") as caught:
-        to_sequences(df, time="time")
+        to_trials(df, time="time")
     said = str(caught.value)
     assert "pd.to_numeric" in said
     assert not re.search("units|label|read_motion", said)
@@ -728,7 +728,7 @@ def test_a_label_that_is_no_feature_is_told_of(values):
         with pytest.raises(ValueError, match=said):
             refused(files)
     with pytest.raises(ValueError, match=said):
-        to_sequences(pd.concat(files), time="time")
+        to_trials(pd.concat(files), time="time")
 
 
 # -- tables with a row an event -------------------------------------------------------------
@@ -741,4 +741,4 @@ def test_tables_of_spikes_are_refused():
     for time, message in zip(times, ("has a gap", "come twice"), strict=True):
         df = pd.DataFrame({"trial": 1, "unit": 3, "spike_time": time})
         with pytest.raises(ValueError, match=rf"{message}.*such as spikes, become rates first"):
-            to_sequences(df, by=["trial", "unit"], time="spike_time")
+            to_trials(df, by=["trial", "unit"], time="spike_time")

@@ -15,9 +15,9 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     MotionTracker,
     OnlineSynchronizer,
-    find_performances,
+    find_trials,
     to_frame,
-    to_sequences,
+    to_trials,
 )
 from sklearn_motionsync.inputs.recorded import (
     Recorded,
@@ -192,7 +192,7 @@ def test_rows_that_are_not_even_steps_of_time_are_warned_of(change, message):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         LinearSynchronizer().fit(X)
-    words = re.compile(f"Performance {len(X) - 1}: .*{message}")
+    words = re.compile(f"Trial {len(X) - 1}: .*{message}")
     assert any(words.match(str(warning.message)) for warning in caught)
     assert max(len(str(warning.message)) for warning in caught) < 600
 
@@ -212,7 +212,7 @@ def rows_of_fold(k, n, n_splits=3):
     return np.sort(order[: n - n // n_splits])
 
 
-SPLIT = r"Performance \d.*: rows look split, as by cross-validation of rows.*to_sequences\(table\)"
+SPLIT = r"Trial \d.*: rows look split, as by cross-validation of rows.*to_trials\(table\)"
 
 
 @pytest.mark.parametrize(
@@ -248,7 +248,7 @@ def test_cross_validation_of_a_table_is_warned_of(splits):
     assert sum("rows look split" in str(each.message) for each in caught) >= 2 * splits.n_splits - 2
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        cross_val_score(pipe, to_sequences(table), cv=3)
+        cross_val_score(pipe, to_trials(table), cv=3)
         pipe.fit(table.iloc[::2]).score(table.iloc[1::3])
 
 
@@ -274,8 +274,8 @@ def test_whole_numbers_of_unknown_rate_with_few_gaps_pass(frames):
 def test_a_take_backwards_is_warned_of_where_it_is_searched():
     t = np.arange(200) / 30
     take = pd.DataFrame({"knee": np.sin(t), "hip": np.cos(1.7 * t)})
-    with pytest.warns(UserWarning, match="Performance 0: its rows are not in order of time"):
-        find_performances(take.iloc[50:90], take.iloc[::-1])
+    with pytest.warns(UserWarning, match="Trial 0: its rows are not in order of time"):
+        find_trials(take.iloc[50:90], take.iloc[::-1])
 
 
 def test_rows_of_tracks_are_even_steps_unless_their_times_are_given():
@@ -293,9 +293,9 @@ def test_rows_of_tracks_are_even_steps_unless_their_times_are_given():
         tracks += [live.smooth] if hasattr(live, "smooth") else []
         for track in tracks:
             track(some, times=[df.index for df in some])
-            with pytest.warns(UserWarning, match="Performance 0: .* not even"):
+            with pytest.warns(UserWarning, match="Trial 0: .* not even"):
                 track(some)
-            with pytest.warns(UserWarning, match="Performance 0: .* order of time"):
+            with pytest.warns(UserWarning, match="Trial 0: .* order of time"):
                 track([df.iloc[::-1] for df in X])
 
 
@@ -366,7 +366,7 @@ def test_rows_have_the_events_and_the_clock_of_their_frames(first, stop, step):
         assert facts["first_time"] == pytest.approx(2 + first / RATE)
         assert facts.get("first_frame") == (5 if first == 0 else None)
         whole = len(places) == len(df)
-        # A whole table may hold several performances, rows mixed, and the rate is that of each.
+        # A whole table may hold several trials, rows mixed, and the rate is that of each.
         assert facts["frame_rate"] == (RATE if len(df) == 60 else RATE / step)
         moved = [x if x is None else (x - first) / step for x in (e["frame"] for e in EVENTS)]
         last = len(rows) - 1
@@ -441,12 +441,10 @@ def test_attrs_that_are_true_of_any_rows():
 def test_key_frames_are_seconds_if_all_are_in_the_first_fiftieth(frames, n_frames, refused):
     frames = np.array(frames)
     if not refused:
-        refuse_seconds(frames, n_frames, "Performance 3")
+        refuse_seconds(frames, n_frames, "Trial 3")
         return
-    with pytest.raises(
-        ValueError, match=rf"^Performance 3: its key-frames .* has {n_frames} frame"
-    ):
-        refuse_seconds(frames, n_frames, "Performance 3")
+    with pytest.raises(ValueError, match=rf"^Trial 3: its key-frames .* has {n_frames} frame"):
+        refuse_seconds(frames, n_frames, "Trial 3")
 
 
 def test_events_of_other_rows_are_refused_by_row_and_frame():
@@ -463,6 +461,6 @@ def test_events_of_other_rows_are_refused_by_row_and_frame():
         (slice(None, None, 2), 1, 2),
     ):
         with pytest.raises(
-            ValueError, match=rf"^Performance 2: by its index row {row} is frame {frame} "
+            ValueError, match=rf"^Trial 2: by its index row {row} is frame {frame} "
         ):
             refuse_moved_events([good, np.zeros((9, 1)), good.iloc[rows]])

@@ -12,7 +12,7 @@ PACKAGE = Path(sklearn_motionsync.__file__).parent
 # A number that may be 1 and a plural behind it, in an f-string.
 PLURALS = re.compile(
     r'f".*\{(len\([^{}]*\)|n_(?!frames)\w+|[\w.]+\.shape\[[01]\])\} '
-    r"(performances|takes|features|gaps|warps|rows|columns|channels|samples|labels|postures)\b"
+    r"(trials|takes|features|gaps|warps|rows|columns|channels|samples|labels|poses)\b"
 )
 # Numbers that are never 1.
 KEPT = [
@@ -31,9 +31,9 @@ def test_one_is_singular():
         "1 frame",
         "40.5 frames",
     ]
-    assert repr(Match([[0, 1, 2]])) == "Match(1 performance on 3 frames)"
+    assert repr(Match([[0, 1, 2]])) == "Match(1 trial on 3 frames)"
     with pytest.raises(ValueError, match="must be 1 different label, one a"):
-        to_frame([[[0.0], [1.0]]], performances=["a", "b"])
+        to_frame([[[0.0], [1.0]]], trials=["a", "b"])
 
 
 def test_messages_count_by_one_function():

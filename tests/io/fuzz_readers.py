@@ -15,7 +15,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.io import find_gaps, read_motion
 from sklearn_motionsync.io.c3d import MissingGroup
 
@@ -193,7 +193,7 @@ def run_case(files, folder):
 def read_all(path, folder):
     """DataFrames, or the arrays of an archive."""
     if path.suffix == ".npz":
-        bunch = load_performances(path)
+        bunch = load_trials(path)
         parents = bunch.skeleton.parents if bunch.skeleton else ()
         assert len(bunch.data) == len(bunch.target) == len(bunch.frame_rate)
         assert all(-1 <= p < len(bunch.joints) for p in parents)

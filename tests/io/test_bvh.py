@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import Skeleton
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.io import read_motion
 
 from motion_files import body, joint, put
@@ -192,7 +192,7 @@ def test_real_file_agrees_with_the_archive(real_data):
     df = read_motion(path)
     assert df.shape == (157, 3 * 142)
     assert df.attrs["frame_rate"] == pytest.approx(60, rel=1e-4)
-    archive = load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    archive = load_trials(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
     columns = [f"{j}_{axis}" for j in archive.joints for axis in "xyz"]
     np.testing.assert_allclose(df[columns], archive.data[0], atol=1e-4)
     assert Skeleton.from_frame(df[columns]) == archive.skeleton

@@ -664,7 +664,7 @@ def test_real_files_agree_with_the_package_c3d(real_data):
     first = frames["Eb015pi"]
     for name, df in frames.items():
         np.testing.assert_allclose(df, first, atol=1e-3)
-        assert df.attrs == first.attrs | {"performance": name}
+        assert df.attrs == first.attrs | {"trial": name}
     assert first.attrs["joints"][:3] == ["RFT1", "RFT2", "RFT3"]
     events = [(event["label"], event["time"], event["frame"]) for event in first.attrs["events"]]
     assert events == [("RIC", 2.72, 136), ("RHS", 5.4, 270), ("RTO", 7.32, 366)]

@@ -1,4 +1,4 @@
-"""cut_at_events: bounds, attrs and labels of performances, and errors."""
+"""cut_at_events: bounds, attrs and labels of trials, and errors."""
 
 import numpy as np
 import pandas as pd
@@ -56,7 +56,7 @@ def rows(parts):
         (LEFT, "General", []),
     ],
 )
-def test_performances_last_from_start_to_stop(start, stop, expected):
+def test_trials_last_from_start_to_stop(start, stop, expected):
     assert rows(cut_at_events(recording(*WALK), start, stop)) == expected
     assert rows(cut_at_events(recording(*WALK[::-1]), start, stop)) == expected
 
@@ -66,7 +66,7 @@ def test_first_and_last_frames_of_a_recording_may_be_events():
     assert rows(cut_at_events(recording(*ends), STRIKE)) == [[0, 199]]
 
 
-def test_attrs_belong_to_the_performance():
+def test_attrs_belong_to_the_trial():
     df = recording(*WALK, frame_rate=50.0, kind="markers", first_frame=101)
     before = df.copy()
     first, second = cut_at_events(df, LEFT)
@@ -96,18 +96,18 @@ def test_times_are_cut_too():
 
 def test_labels_follow_those_of_the_recording():
     def labels(parts):
-        return [(x.attrs["performance"], x.attrs["levels"]) for x in parts]
+        return [(x.attrs["trial"], x.attrs["levels"]) for x in parts]
 
     plain = cut_at_events(recording(*WALK), LEFT)
-    assert labels(plain) == [(i, ("performance", "frame")) for i in range(2)]
-    named = cut_at_events(recording(*WALK), LEFT, performance="walk")
+    assert labels(plain) == [(i, ("trial", "frame")) for i in range(2)]
+    named = cut_at_events(recording(*WALK), LEFT, trial="walk")
     assert labels(named) == [(("walk", i), ("recording", "part", "frame")) for i in range(2)]
-    known = recording(*WALK, performance=("ann", 3), levels=("subject", "trial", "frame"))
+    known = recording(*WALK, trial=("ann", 3), levels=("subject", "trial", "frame"))
     levels = ("subject", "trial", "part", "frame")
     assert labels(cut_at_events(known, LEFT)) == [(("ann", 3, i), levels) for i in range(2)]
     again = cut_at_events(cut_at_events(known, LEFT)[0], OFF)
     assert labels(again) == [(("ann", 3, 0, 0), ("subject", "trial", "part", "part_4", "frame"))]
-    pair = cut_at_events(recording(*WALK), LEFT, performance=("ann", 3))
+    pair = cut_at_events(recording(*WALK), LEFT, trial=("ann", 3))
     assert pair[0].attrs["levels"] == ("recording_0", "recording_1", "part", "frame")
     assert len(to_frame(named)) == 72 + 71
 
@@ -117,7 +117,7 @@ def test_event_marked_twice_in_a_frame_counts_once():
     assert rows(cut_at_events(recording(*events), "a")) == [[9, 30]]
 
 
-def test_events_within_performances_are_keyframes():
+def test_events_within_trials_are_keyframes():
     parts = cut_at_events(recording(*WALK), STRIKE)
     with_off = [x for x in parts if any(e["label"] == OFF for e in x.attrs["events"])]
     keyframes = [[e["frame"] for e in x.attrs["events"]] for x in with_off]
@@ -134,7 +134,7 @@ def test_events_within_performances_are_keyframes():
             None,
             r"recording has no events; attrs\['events'\] mu",
         ),
-        (recording(*WALK, performance="w"), "a", None, r"^The recording 'w' has no event 'a' for"),
+        (recording(*WALK, trial="w"), "a", None, r"^The recording 'w' has no event 'a' for"),
         (recording(*WALK), "Heel", None, r"no event 'Heel' for start; there are \('Foot Str"),
         (recording(*WALK), LEFT, (OFF, "Both"), r"no event \('Foot Off', 'Both'\) for stop; .*'G"),
         (recording(*WALK), LEFT, OFF[:4], r"\('Foot Strike', 'Left'\) \(4\), .*'General' \(1\)"),
@@ -177,15 +177,15 @@ def test_groups_of_a_file_are_cut_at_the_same_times(tmp_path, group):
 
 
 def test_a_static_trial_without_events_gives_none_and_is_named():
-    message = r"^The recording 'standing' has no events, so no performance is cut out of it\.$"
+    message = r"^The recording 'standing' has no events, so no trial is cut out of it\.$"
     with pytest.warns(UserWarning, match=message) as caught:
-        assert cut_at_events(recording(performance="standing"), LEFT) == []
+        assert cut_at_events(recording(trial="standing"), LEFT) == []
     assert caught[0].filename == __file__
 
 
 def test_messages_are_short_whatever_is_marked():
     many = [("a long label of an event " * 9 + str(k), "General", 3.0) for k in range(200)]
-    for df in (recording(*many, performance="p" * 300), recording(("a", None, "x" * 9999))):
+    for df in (recording(*many, trial="p" * 300), recording(("a", None, "x" * 9999))):
         with pytest.raises(ValueError, match="The recording") as caught:
             cut_at_events(df, LEFT)
         assert len(str(caught.value)) < 600

@@ -107,7 +107,7 @@ def one_changed(value):
         (one_changed("far"), "column 'b_y', is not a numeric array: got str, 'far'"),
         (with_gaps().astype(complex), "complex data are not supported"),
         (with_gaps().astype("M8[ns]"), "column 'a_x', holds dates"),
-        (pd.concat({"p": with_gaps(), "q": with_gaps()}), "of one performance, got a table of 2"),
+        (pd.concat({"p": with_gaps(), "q": with_gaps()}), "of one trial, got a table of 2"),
     ],
 )
 def test_other_input_is_refused(df, message):
@@ -117,7 +117,7 @@ def test_other_input_is_refused(df, message):
         fill_gaps(df, 3)
 
 
-def test_tables_are_filled_performance_by_performance():
+def test_tables_are_filled_trial_by_trial():
     table = pd.concat({"p": with_gaps(), "q": with_gaps() * 2})
     filled = table.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=9)
     np.testing.assert_array_equal(filled.loc["q"], fill_gaps(with_gaps() * 2, 9))
@@ -199,7 +199,7 @@ def test_events_and_clock_of_a_trimmed_recording(even):
 
 def test_what_cannot_be_trimmed_is_refused_by_name():
     df = with_gaps()
-    df.attrs["performance"] = "walk7"
+    df.attrs["trial"] = "walk7"
     with pytest.raises(ValueError, match="ends must be 'keep' or 'trim', got 'cut'"):
         fill_gaps(df, 3, ends="cut")
     df[["b_x"]] = np.where(np.arange(60) == 20, 0, np.nan)[:, None]

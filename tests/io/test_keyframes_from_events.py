@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pytest
-from sklearn_motionsync import DenseSynchronizer, to_frame, to_sequences
+from sklearn_motionsync import DenseSynchronizer, to_frame, to_trials
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.io import cut_at_events, keyframes_from_events, read_motion
 
@@ -18,7 +18,7 @@ def trials(levels=("subject", "trial", "frame"), start=0, **attrs):
     out = []
     for label, n in zip(TRUTH, LENGTHS, strict=True):
         out.append(pd.DataFrame({"knee": np.zeros(n)}, index=pd.RangeIndex(start, start + n)))
-        out[-1].attrs = {"performance": label, "levels": levels, **attrs}
+        out[-1].attrs = {"trial": label, "levels": levels, **attrs}
     return out
 
 
@@ -54,7 +54,7 @@ def test_seconds(time):
     check(keyframes_from_events(X, events, frame_rate=200))
     check(keyframes_from_events(X, events, frame_rate=[200] * 3))
     check(keyframes_from_events(trials(frame_rate=200.0), events))
-    with pytest.raises(ValueError, match=r"frame rate of performance 0 \('ann', 1\)|frame rate of"):
+    with pytest.raises(ValueError, match=r"frame rate of trial 0 \('ann', 1\)|frame rate of"):
         keyframes_from_events(X, events)
     # As events of one recording are, of which the trials are parts.
     late = trials(frame_rate=200.0, first_time=3.0)
@@ -69,7 +69,7 @@ def test_times_and_frames_are_those_of_the_index():
     check(keyframes_from_events(late, table("seconds", 1 / 50, start=40)))
     # Made by the package, of a table of times.
     long = to_frame(late).reset_index()
-    X = to_sequences(long, by=["subject", "trial"], time="time")
+    X = to_trials(long, by=["subject", "trial"], time="time")
     check(keyframes_from_events(X, table("seconds", 1 / 50, start=40)))
 
 
@@ -80,7 +80,7 @@ def test_frames_count_where_both_are_given():
 @pytest.mark.parametrize("make", [list, np.stack, lambda X: np.stack(X)[:, :, 0]])
 def test_arrays_are_numbered(make):
     X = make([np.zeros((100, 1))] * 3)
-    for column in ("trial", "performance"):
+    for column in ("trial", "trial"):
         events = pd.DataFrame({column: [2, 0], "event": "apex", "frame": [40, 30.5]})
         found = keyframes_from_events(X, events)
         np.testing.assert_array_equal(found["apex"], [30.5, np.nan, 40])
@@ -130,9 +130,9 @@ MORE = pd.DataFrame([("ann", 2, NAMES[1], 90.0)], columns=table().columns)
 BAD = {
     "twice": (
         pd.concat([table(), changed(frame=64.0)[:1]]),
-        r"^Performance 0 \('ann', 1\): event 'toe-off' comes twice, in rows 6.* and 6",
+        r"^Trial 0 \('ann', 1\): event 'toe-off' comes twice, in rows 6.* and 6",
     ),
-    "outside": (changed(frame=101), "^Performance 0 .*'toe-off' at 101 is outside.* 100"),
+    "outside": (changed(frame=101), "^Trial 0 .*'toe-off' at 101 is outside.* 100"),
     "before": (changed(frame=-1), "'toe-off' at -1 is outside of it, from 0 to 100"),
     "unknown": (changed(trial=7), r"trial \('ann', 7\) of event 'toe-off' is not in X"),
     "none known": (table().assign(subject="eve"), r"trial \('eve', .* is not in X, whose trials"),
@@ -181,7 +181,7 @@ def gait_cycles():
     gait = make_gait(4, 3, takes=True, random_state=0)
     takes = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
     for take, events, person in zip(takes, gait.events, gait.person, strict=True):
-        take.attrs = {"events": events, "frame_rate": gait.frame_rate, "performance": person}
+        take.attrs = {"events": events, "frame_rate": gait.frame_rate, "trial": person}
     return gait, takes, [x for take in takes for x in cut_at_events(take, "Foot Strike")]
 
 
@@ -193,7 +193,7 @@ def test_events_of_cut_cycles():
     is_toe_off = [name.startswith("toe-off") for name in gait.keyframe_names]
     truth = gait.keyframes[:, is_toe_off].ravel() - [x.attrs["rows"][0] for x in cycles]
     np.testing.assert_allclose(found.to_numpy()[:, 0], truth, atol=1e-4)
-    assert found.index.to_list() == [x.attrs["performance"] for x in cycles]
+    assert found.index.to_list() == [x.attrs["trial"] for x in cycles]
     pd.testing.assert_series_equal(
         keyframes_from_events(cycles, names=["foot off"])["foot off"],
         found[("Foot Off", "Right")].rename("foot off"),
@@ -210,7 +210,7 @@ def test_events_of_cut_cycles():
 def test_a_table_of_the_same_events_says_the_same():
     _, _, cycles = gait_cycles()
     rows = [
-        dict(zip(("recording", "part"), x.attrs["performance"], strict=True)) | event
+        dict(zip(("recording", "part"), x.attrs["trial"], strict=True)) | event
         for x in cycles
         for event in x.attrs["events"]
     ]
@@ -221,7 +221,7 @@ def test_a_table_of_the_same_events_says_the_same():
 
 def test_rows_that_events_do_not_count_are_refused():
     _, _, cycles = gait_cycles()
-    with pytest.raises(ValueError, match="Performance 0: by its index row 0 is frame 5 of the rec"):
+    with pytest.raises(ValueError, match="Trial 0: by its index row 0 is frame 5 of the rec"):
         keyframes_from_events([cycles[0].iloc[5:]])
 
 

@@ -59,7 +59,7 @@ def test_every_reader_returns_a_table_with_its_attrs(tmp_path, ending):
     attrs = df.attrs
     assert json.loads(json.dumps(attrs, allow_nan=False)) == attrs
     assert attrs["format"] == ending.removeprefix(".")
-    assert (attrs["performance"], attrs["levels"]) == ("a", ["recording", "frame"])
+    assert (attrs["trial"], attrs["levels"]) == ("a", ["recording", "frame"])
     assert {"frame_rate", "units", "up", "kind"} < set(attrs)
     assert ("joints" in attrs) == ("parents" in attrs) == ("channels" not in attrs)
     if "joints" in attrs:
@@ -81,7 +81,7 @@ def test_every_reader_takes_its_ending_in_capitals_and_line_ends_of_windows(tmp_
         put(tmp_path, other, name.upper())
     df = read_motion(tmp_path / f"A{ending.upper()}", max_gap=9 * ("joints" in expected.attrs))
     pd.testing.assert_frame_equal(df, expected)
-    assert df.attrs == expected.attrs | {"performance": "A"}
+    assert df.attrs == expected.attrs | {"trial": "A"}
 
 
 @pytest.mark.parametrize("ending", [ending for ending in READERS if ending in DAMAGES])

@@ -37,11 +37,11 @@ def test_recordings_hold_the_positions_and_attrs_of_each_individual():
     assert list(ann.columns) == [f"{joint}_{axis}" for joint in joints for axis in "xy"]
     facts = {"format": "poses", "frame_rate": 50.0, "units": None, "up": "-y", "kind": "keypoints"}
     facts |= {"joints": joints, "parents": [-1] * 3, "first_time": 0.0}
-    assert ann.attrs == facts | {"performance": "ann", "levels": ("individual", "frame")}
-    assert bob.attrs["performance"] == "bob"
+    assert ann.attrs == facts | {"trial": "ann", "levels": ("individual", "frame")}
+    assert bob.attrs["trial"] == "bob"
     json.dumps(ann.attrs)
-    _, bob = from_poses(poses(), performance="trial1")
-    assert bob.attrs["performance"] == ("trial1", "bob")
+    _, bob = from_poses(poses(), trial="trial1")
+    assert bob.attrs["trial"] == ("trial1", "bob")
     assert bob.attrs["levels"] == ("recording", "individual", "frame")
     assert LinearSynchronizer(n_frames=9).fit_transform([ann, bob]).shape == (2, 9, 6)
     assert len(to_frame([ann, bob])) == 80
@@ -96,11 +96,11 @@ def test_selected_individuals_and_keypoints_keep_their_names():
     for ds in (poses().sel(individual="bob"), poses().rename(OLD).sel(individuals="bob")):
         (bob,) = from_poses(ds, min_confidence=0)
         pd.testing.assert_frame_equal(bob, expected)
-        assert bob.attrs["performance"] == "bob"
+        assert bob.attrs["trial"] == "bob"
     (knee,) = from_poses(poses().sel(individual="bob", keypoint="left knee"))
     pd.testing.assert_frame_equal(knee, expected[["left knee_x", "left knee_y"]])
     nameless = from_poses(poses().drop_vars(["individual", "keypoint"]))
-    assert [df.attrs["performance"] for df in nameless] == ["individual_0", "individual_1"]
+    assert [df.attrs["trial"] for df in nameless] == ["individual_0", "individual_1"]
     assert nameless[0].attrs["joints"] == ["keypoint_0", "keypoint_1", "keypoint_2"]
 
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import to_sequences
+from sklearn_motionsync import to_trials
 from sklearn_motionsync.io import cut_at_events, fill_gaps
 
 RATE = 120.0
@@ -35,7 +35,7 @@ def recording(rng):
 
 
 def check_attrs(part, whole, step=1):
-    """Events, times and frame rate of a performance are those of its rows."""
+    """Events, times and frame rate of a trial are those of its rows."""
     numbers = part["number"].to_numpy()
     for event in part.attrs["events"]:
         assert np.interp(event["frame"], np.arange(len(part)), numbers) == pytest.approx(
@@ -65,7 +65,7 @@ def test_a_recording_without_its_beginning_or_end_is_cut_at_the_same_frames(seed
         found = cut_at_events(some, "Strike")
         for x, y in zip(found, inside, strict=True):
             pd.testing.assert_frame_equal(x, y)
-            drop = "performance"
+            drop = "trial"
             assert {**x.attrs, drop: 0} == {**y.attrs, drop: 0}
             check_attrs(x, df)
 
@@ -146,11 +146,11 @@ def test_an_index_that_does_not_tell_frames_is_refused(index):
         cut_at_events(df, "Strike")
     (part,) = cut_at_events(df.reset_index(drop=True), "Strike")
     assert part.attrs["rows"] == [9, 30]
-    (x,) = to_sequences(df.assign(trial=0), by="trial")
+    (x,) = to_trials(df.assign(trial=0), by="trial")
     assert "events" not in x.attrs
 
 
-def test_an_empty_recording_has_no_performances():
+def test_an_empty_recording_has_no_trials():
     df = recording(np.random.default_rng(0))
     assert cut_at_events(df.iloc[:0], "Strike") == []
 

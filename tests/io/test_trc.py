@@ -20,7 +20,7 @@ def test_positions_and_attrs_are_read(tmp_path):
     assert list(df.columns) == [f"{name}_{axis}" for name in NAMES for axis in "xyz"]
     facts = {"format": "trc", "kind": "markers", "units": "mm", "up": None, "frame_rate": 50.0}
     facts |= {"joints": NAMES, "parents": [-1] * 3, "first_frame": 1, "first_time": 0.0}
-    facts |= {"performance": "a", "levels": ["recording", "frame"]}
+    facts |= {"trial": "a", "levels": ["recording", "frame"]}
     assert df.attrs == facts
     assert read(tmp_path, trc(tracks(), NAMES, units="m")).attrs["units"] == "m"
 
@@ -155,7 +155,7 @@ def test_contradiction_of_rate_and_times_is_a_warning(tmp_path):
 def test_lost_frames_are_uneven_times(tmp_path):
     times = np.delete(np.arange(41) / 50, 17)
     text = trc(tracks(), NAMES, times=times)
-    with pytest.warns(UserWarning, match=r"steps of 0.02 to 0.04 s, .*to_sequences\(df\.assign"):
+    with pytest.warns(UserWarning, match=r"steps of 0.02 to 0.04 s, .*to_trials\(df\.assign"):
         df = read(tmp_path, text)
     assert df.attrs["frame_rate"] is None
     np.testing.assert_allclose(df.attrs["times"], times)

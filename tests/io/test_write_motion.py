@@ -10,7 +10,7 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     Skeleton,
-    blend_performances,
+    blend_trials,
 )
 from sklearn_motionsync.datasets import make_bending, make_walk
 from sklearn_motionsync.io import read_motion, write_motion
@@ -71,7 +71,7 @@ def bodies():
     aligned = pipe[:-1].transform(BENDING.data[:1])
     back = pipe[:2].inverse_transform(aligned)
     sample = pipe[:2].inverse_transform(pipe[-1].sample(1, random_state=0))
-    blend = blend_performances(pipe[:-1], BENDING.data[:2], weights=[0.5, 0.5])
+    blend = blend_trials(pipe[:-1], BENDING.data[:2], weights=[0.5, 0.5])
     walk = make_walk(1, noise=0, random_state=0)
     return {
         "synchronised": (back[0], skeleton),

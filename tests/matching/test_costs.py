@@ -13,7 +13,7 @@ from sklearn_motionsync.matching.matcher import cost_features
 from oracle import FEATURES, STEP_WEIGHTS, slow_filter
 
 METHOD = Path(__file__).parents[2] / "docs" / "method.md"
-DIRECT = {"cost": "posture", "smoothness": 0, "consensus": 0, "max_offset": 1}
+DIRECT = {"cost": "pose", "smoothness": 0, "consensus": 0, "max_offset": 1}
 
 
 @pytest.mark.parametrize("cost", COSTS)
@@ -57,7 +57,7 @@ def test_features_equal_oracle(cost, pace, smoothing):
 
 
 def test_step_table_refuses_unknown_cost():
-    with pytest.raises(ValueError, match=r"cost='dtw' is unknown; use one of .*'posture'"):
+    with pytest.raises(ValueError, match=r"cost='dtw' is unknown; use one of .*'pose'"):
         step_table("dtw")
 
 

@@ -69,7 +69,7 @@ CASES = [(6, 2, 1, 2, 0.5, 0.25), (6, 3, 1, 3, 0.75, 0.5), (5, 2, 2, 2, 0.5, 1.0
 @pytest.mark.parametrize("cost", [*COSTS, "exact"])
 def test_best_path_with_gaps_equals_all_admissible_paths(case, cost, kept):
     n_frames, max_rate, subframes, reach, mu, unseen = case
-    exact, cost = cost == "exact", "posture" if cost == "exact" else cost
+    exact, cost = cost == "exact", "pose" if cost == "exact" else cost
     bases, moving = draw(n_frames, n_frames, subframes, exact)
     costs = step_costs(cost, max_rate, subframes)
     trellis = Trellis(step_table(cost, max_rate, subframes), mu, reach, unseen=unseen)
@@ -93,7 +93,7 @@ def test_best_path_with_gaps_equals_all_admissible_paths(case, cost, kept):
 
 def test_ties_take_the_same_step_in_every_way_of_back_tracking(monkeypatch):
     bases, moving = draw(3, 7, 1, exact=True)
-    trellis = Trellis(step_table("posture", 2, 1), 0.25, 3, unseen=0.5)
+    trellis = Trellis(step_table("pose", 2, 1), 0.25, 3, unseen=0.5)
     found = []
     for small_bytes, row_bytes in KEPT.values():
         monkeypatch.setattr(module, "SMALL_BYTES", [small_bytes] * 2)
@@ -160,7 +160,7 @@ def brute_force_of(path, base, other, costs, mu, unseen):
 
 
 def curves(n=6, n_frames=80, seed=0):
-    """Performances of five features: three that move by two hidden ones, and these."""
+    """Trials of five features: three that move by two hidden ones, and these."""
     rng, t = np.random.default_rng(seed), np.linspace(0, 1, n_frames)
     out = []
     for _ in range(n):
@@ -219,7 +219,7 @@ def of_times(value_time, velocity_time):
 
 @pytest.mark.parametrize("velocity_time", [0.3, 1.9])
 def test_hidden_values_are_the_conditional_expectation_of_all_their_values(velocity_time):
-    """Against one covariance of all values of a performance: frames times features."""
+    """Against one covariance of all values of a trial: frames times features."""
     filler = of_times(12.0, velocity_time)
     array, rng = curves(1, 30, seed=7)[0], np.random.default_rng(2)
     hidden = np.zeros(array.shape, dtype=bool)
@@ -240,7 +240,7 @@ def test_hidden_values_are_the_conditional_expectation_of_all_their_values(veloc
 
 
 def test_weights_are_what_is_known_of_a_step_in_the_middle_of_a_gap():
-    """Against the covariance of all values of a performance, given what was seen."""
+    """Against the covariance of all values of a trial, given what was seen."""
     filler = of_times(12.0, 3.0)
     array = curves(1, 30, seed=7)[0]
     gaps = {(8, 15): [1, 3], (20, 29): [0], (3, 3): [2]}
@@ -273,7 +273,7 @@ def test_weights_are_what_is_known_of_a_step_in_the_middle_of_a_gap():
     assert expected[3] == 1 > expected[[8, 20]].max()
 
 
-def test_moments_are_those_of_the_postures_that_show_them():
+def test_moments_are_those_of_the_poses_that_show_them():
     rng = np.random.default_rng(3)
     arrays = [rng.standard_normal((n, 4)).cumsum(axis=0) for n in (30, 50)]
     for array in arrays:

@@ -14,7 +14,7 @@ from sklearn_motionsync.matching.median import (
 from oracle import global_distances, step_costs
 
 # Those of the paper; nothing is smoothed or compared at fewer frames.
-PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
+PAPER = {"cost": "pose", "max_rate": 2, "consensus": 0}
 
 
 def made_people(n, n_frames=30):
@@ -40,7 +40,7 @@ def test_median_has_the_smallest_sum_over_all_pairs(n):
     sync = DenseSynchronizer(smoothness=0.1, max_offset=0.25, **PAPER).fit(X)
     centred = X - X.mean(axis=(0, 1))
     mu = 0.1 * np.square(centred).sum(axis=2).mean()
-    sums = global_distances(centred, step_costs("posture", 2, 1), mu, 1, 3)
+    sums = global_distances(centred, step_costs("pose", 2, 1), mu, 1, 3)
     np.testing.assert_allclose(sync.mu_, mu)
     np.testing.assert_allclose(sync.global_distances_, sums, rtol=1e-9, atol=1e-9)
     assert sync.pattern_index_ == np.argmin(sums)
@@ -70,7 +70,7 @@ def test_ties_go_to_the_first(n):
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("method", [LinearSynchronizer, DenseSynchronizer])
 def test_rounding_does_not_choose_the_pattern(method, dtype):
-    """Two performances have equal global distances: the first is the median."""
+    """Two trials have equal global distances: the first is the median."""
     rng, settings = np.random.default_rng(0), {}
     if method is DenseSynchronizer:
         settings = {**PAPER, "max_offset": 0}
@@ -157,7 +157,7 @@ def test_median_of_many_is_nearly_the_most_typical(many, settings, monkeypatch):
     assert again.global_distances_.tobytes() == draws[0]
 
 
-def test_equal_performances_of_many_give_the_first(many):
+def test_equal_trials_of_many_give_the_first(many):
     X = [many[0].astype(np.float32) + 1000] * 120
     for settings in (PAPER, {}):
         assert DenseSynchronizer(**settings).fit(X).pattern_index_ == 0

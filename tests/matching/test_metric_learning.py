@@ -12,7 +12,7 @@ P = 24
 
 @pytest.fixture
 def curves():
-    """Five performances of a movement of three features, and their velocities."""
+    """Five trials of a movement of three features, and their velocities."""
     rng, t = np.random.default_rng(0), np.linspace(0, 1, P)
     X = []
     for _ in range(5):
@@ -45,7 +45,7 @@ def slow_matrix(block, differences):
 
 
 def slow_differences(block, times, weight, compress=lambda x: x):
-    """Of all pairs of an odd number of performances, in a circle, at the times of the later one."""
+    """Of all pairs of an odd number of trials, in a circle, at the times of the later one."""
     out, frames = [], np.arange(P)
     for n, base in enumerate(compress(block)):
         for m, other in enumerate(block):
@@ -94,22 +94,22 @@ def test_metric_equals_loops_over_pairs_and_frames(curves):
     unmatched = np.broadcast_to(np.arange(P, dtype=float), times.shape)
     first = slow_matrix(fast, slow_differences(fast, unmatched, 0))
     np.testing.assert_allclose(inner(seen[0]), fast_inner(fast, first), atol=1e-9)
-    postures = np.array([x - x.mean(axis=0) for x in positions])
+    poses = np.array([x - x.mean(axis=0) for x in positions])
     energy = np.mean([v @ v for x in velocity for v in x])
     of_fast = slow_differences(velocity, times, 0.2, lambda x: slow_compressed(x, energy))
-    of_postures = slow_differences(postures, times, 0)
-    weight = slow_length(of_fast) / slow_length(of_postures)
-    by_fast, by_postures = slow_matrix(fast, of_fast), slow_matrix(postures, of_postures)
-    gram = fast_inner(fast, by_fast) + weight * fast_inner(postures, by_postures)
+    of_poses = slow_differences(poses, times, 0)
+    weight = slow_length(of_fast) / slow_length(of_poses)
+    by_fast, by_poses = slow_matrix(fast, of_fast), slow_matrix(poses, of_poses)
+    gram = fast_inner(fast, by_fast) + weight * fast_inner(poses, by_poses)
     # The largest of its principal parts that make 99 %, three at most.
     values, vectors = np.linalg.eigh(gram)
     count = min(3, 1 + np.searchsorted(np.cumsum(values[::-1]), 0.99 * values.sum()))
     expected = (vectors[:, -count:] * values[-count:]) @ vectors[:, -count:].T
     np.testing.assert_allclose(inner(metric(velocity, positions)), expected, atol=1e-9)
-    assert metric.velocity.shape == metric.posture.shape == (3, count)
-    after = total(of_fast, by_fast) + weight * total(of_postures, by_postures)
+    assert metric.velocity.shape == metric.pose.shape == (3, count)
+    after = total(of_fast, by_fast) + weight * total(of_poses, by_poses)
     before = total(slow_differences(fast, unmatched, 0), by_fast)
-    before += weight * total(slow_differences(postures, unmatched, 0), by_postures)
+    before += weight * total(slow_differences(poses, unmatched, 0), by_poses)
     assert evidence.remaining == pytest.approx(after / before)
 
 
@@ -122,7 +122,7 @@ def pairs_of(others):
 
 
 def inner(features):
-    """Inner products of all frames of all performances."""
+    """Inner products of all frames of all trials."""
     frames = np.concatenate(list(features))
     return frames @ frames.T
 
@@ -142,7 +142,7 @@ def test_metric_matrix_of_unreliable_features_is_zero():
     np.testing.assert_array_equal(metric_matrix(0 * block, 0 * spread), 0)
 
 
-def test_constant_performances_give_no_metric():
+def test_constant_trials_give_no_metric():
     still = np.ones((4, P, 2))
     assert metric_of_matches(None, still - 1, 0 * still) is None
     assert metric_of_matches(None, np.random.default_rng(0).normal(size=(1, P, 2)), still) is None
@@ -166,7 +166,7 @@ def test_shares_add_up_to_one(curves):
     metric, _ = metric_of_matches(fixed_match(some_times(5)), positions, velocity)
     shares = metric.shares(velocity, positions)
     assert shares.sum() == pytest.approx(1)
-    first = metric.velocity * [[1], [0], [0]], 0 * metric.posture
+    first = metric.velocity * [[1], [0], [0]], 0 * metric.pose
     only = Metric(metric.features, metric.energy, *first)
     np.testing.assert_allclose(only.shares(velocity, positions), [1, 0, 0], atol=1e-12)
 

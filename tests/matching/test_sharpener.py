@@ -125,7 +125,7 @@ def test_long_trials_are_matched_at_fewer_frames():
 
 
 def test_a_long_warp_to_itself_is_exact():
-    """Rough curves: a template that is sampled elsewhere than the trial would not fit."""
+    """Rough curves: a pattern that is sampled elsewhere than the trial would not fit."""
     times = np.linspace(0, P - 1, 375)
     rough = movement(times) + 0.05 * np.random.default_rng(0).standard_normal((375, 2))
     own = np.arange(375.0)[np.newaxis]

@@ -158,7 +158,7 @@ def test_ties_keep_the_pace():
 @pytest.mark.parametrize("subframes", [1, 3])
 def test_paths_are_pinned_monotone_and_in_the_band(subframes):
     bases, moving = draw(np.random.default_rng(2), 4, 50, subframes)
-    table = step_table("posture", max_rate=3, subframes=subframes)
+    table = step_table("pose", max_rate=3, subframes=subframes)
     disparities = Trellis(table, 0.01, 7).paths(bases, moving)
     assert (disparities[..., [0, -1]] == 0).all()
     assert np.abs(disparities).max() <= 7 * subframes

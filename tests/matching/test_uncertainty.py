@@ -58,8 +58,8 @@ def test_spread_equals_that_of_all_paths(cost):
 def test_equal_sequences_are_certain():
     t = np.linspace(0, 1, 60)[:, np.newaxis]
     x = np.hstack([np.sin(5 * t), np.cos(7 * t)])[np.newaxis]
-    trellis = Trellis.on_clock("posture", 60, 0.01, max_offset=0.25, max_rate=2)
-    matcher = Matcher(Features("posture", 1, 0.0, None), trellis)
+    trellis = Trellis.on_clock("pose", 60, 0.01, max_offset=0.25, max_rate=2)
+    matcher = Matcher(Features("pose", 1, 0.0, None), trellis)
     found = uncertainty_of_paths(matcher, x, x, np.arange(60.0)[np.newaxis])
     np.testing.assert_allclose(found.half_widths, 0, atol=1e-6)
     np.testing.assert_allclose(found.shares, 0, atol=1e-12)

@@ -30,7 +30,7 @@ def test_constant_features_become_zero(sequences, value):
     unit = Unit.of(sequences)
     assert (unit(sequences)[:, :, 2] == 0).all()
     np.testing.assert_array_equal(np.flatnonzero(unit.rounding), [2] if value else [])
-    # A new performance in which the feature varies.
+    # A new trial in which the feature varies.
     sequences[0, 3, 2] = value + 1
     assert unit(sequences)[0, 3, 2] == pytest.approx(1 / unit.size, rel=1e-3)
     assert unit.size == Unit.of(sequences[:, :, [0, 1, 3, 4]]).size
@@ -44,7 +44,7 @@ def test_copies_count_once(sequences):
     expected = Unit.of(sequences[:, :, :3])(sequences[:, :, :3])
     np.testing.assert_allclose(unit(X)[:, :, [0, 1, 3]], expected, atol=1e-14)
     assert (unit(X)[:, :, [2, 4, 5]] == 0).all()
-    # Where they differ in a new performance, their mean counts.
+    # Where they differ in a new trial, their mean counts.
     X[0, 0, 2] += 3
     assert unit(X)[0, 0, 0] - expected[0, 0, 0] == pytest.approx(1 / unit.size)
 

@@ -75,7 +75,7 @@ def test_vote_equals_the_median_of_all_routes():
 
 @pytest.fixture(scope="module")
 def people():
-    """Forty performances of one movement, of different styles and paces."""
+    """Forty trials of one movement, of different styles and paces."""
     rng, t = np.random.default_rng(0), np.linspace(0, 1, 30)
     X = []
     for _ in range(40):

@@ -106,7 +106,7 @@ def decomposition(before, after):
 
 FIVE = [[0, 1, 2, 3, 4.0]]
 WRONG_WARPS = [
-    ([[0, NAN, 2, 3, 4]], r"Performance 0: \w+ must be from 0 to P - 1 = 4.*nan at frame 1"),
+    ([[0, NAN, 2, 3, 4]], r"Trial 0: \w+ must be from 0 to P - 1 = 4.*nan at frame 1"),
     ([[0, 1, 2, 3, INF]], "got inf at frame 4"),
     ([[0, 1, 2, 3, 4.1]], "got 4.1 at frame 4"),
     ([[-0.1, 1, 2, 3, 4]], "got -0.1 at frame 0"),
@@ -120,7 +120,7 @@ WRONG_WARPS = [
     (np.array(FIVE).astype("m8[s]"), "dates or durations"),
 ]
 WRONG_MOMENTS = [
-    ([[0, 1.5]], "Performance 0: moments are shares.*got 1.5 at frame 1"),
+    ([[0, 1.5]], "Trial 0: moments are shares.*got 1.5 at frame 1"),
     ([[-0.5, 1]], "got -0.5 at frame 0"),
     ([[0, NAN, 1]], "got nan at frame 1"),
     ([[0, 0.5, 0.4, 1]], "must not decrease.*after frame 1"),
@@ -128,15 +128,15 @@ WRONG_MOMENTS = [
     ([[[0, 1]]], r"got \(1, 2\)"),
     ([0, 1], "1 warp and 2 sets"),
     ([], "1 warp and 0 sets"),
-    ([["0", "1"]], "Performance 0: moments is not a numeric"),
+    ([["0", "1"]], "Trial 0: moments is not a numeric"),
     ({"a": [0, 1]}, "got dict"),
     (None, "got NoneType"),
 ]
 WRONG_KEYFRAMES = [
-    (([[NAN]], [2], [9]), r"Performance 0: key-frames .* from 0 to 8, in its own .*nan"),
+    (([[NAN]], [2], [9]), r"Trial 0: key-frames .* from 0 to 8, in its own .*nan"),
     (([[8.5]], [2], [9]), r"from 0 to 8.*\[8.5\]"),
-    (([[-1]], [2], [9]), "Performance 0: key-frames"),
-    (([[5, 4]], [1, 2], [9]), "Performance 0: key-frames must increase"),
+    (([[-1]], [2], [9]), "Trial 0: key-frames"),
+    (([[5, 4]], [1, 2], [9]), "Trial 0: key-frames must increase"),
     (([[4, 5]], [2, 1], [9]), "The pattern: key-frames must increase"),
     (([[5]], [4.5], [9]), "The pattern: .* from 0 to 4, in frames of the clock"),
     (([[5]], [NAN], [9]), "The pattern"),
@@ -145,13 +145,13 @@ WRONG_KEYFRAMES = [
     (([[5], [5]], [2], [9]), r"each of the 1 warp; got the shapes \[\(1,\), \(1,\)\]"),
     (([5], [2], [9]), r"got the shapes \[\(\)\]"),
     (([[5, 6]], [2], [9]), r"got the shapes \[\(2,\)\]"),
-    ((5, [2], [9]), "list of arrays, one a performance, got int"),
+    ((5, [2], [9]), "list of arrays, one a trial, got int"),
     (("lift", [2], [9]), "got str"),
-    (([["lift"]], [2], [9]), "Performance 0: keyframes is not a numeric"),
+    (([["lift"]], [2], [9]), "Trial 0: keyframes is not a numeric"),
     (([np.ma.masked_equal([5], 5)], [2], [9]), "masked"),
-    (([[5]], [2], [1]), "Performance 0: n_frames must be a whole number of at least 2, got 1"),
+    (([[5]], [2], [1]), "Trial 0: n_frames must be a whole number of at least 2, got 1"),
     *((([[5]], [2], [wrong]), f"got {wrong}") for wrong in (9.5, NAN, INF)),
-    (([[5]], [2], [9, 9]), "n_frames must be the lengths of the 1 performance"),
+    (([[5]], [2], [9, 9]), "n_frames must be the lengths of the 1 trial"),
     (([[5]], [2], 9), "n_frames must be the lengths"),
 ]
 
@@ -209,7 +209,7 @@ CASES = {
         decomposition,
         [
             CURVE_REFUSALS[0],
-            ((with_gap(NAN), CURVES[1]), {}, "before, performance 2, frame 7, feature 1 is NaN"),
+            ((with_gap(NAN), CURVES[1]), {}, "before, trial 2, frame 7, feature 1 is NaN"),
         ],
     ),
 }

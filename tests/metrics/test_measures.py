@@ -138,7 +138,7 @@ def test_closed_forms_of_spread():
 
 
 CONSTANT = np.full((3, 20, 2), 0.1)
-# Performances that differ by rounding at most, such as sums of three tenths.
+# Trials that differ by rounding at most, such as sums of three tenths.
 WITHOUT_SPREAD = {
     "constant": (CONSTANT, CONSTANT),
     "zero": (0 * CONSTANT, 0 * CONSTANT),
@@ -150,7 +150,7 @@ WITHOUT_SPREAD = {
 
 @pytest.mark.parametrize("measure", SPREADS)
 @pytest.mark.parametrize("name", WITHOUT_SPREAD)
-def test_spread_is_1_where_performances_differ_by_rounding(measure, name):
+def test_spread_is_1_where_trials_differ_by_rounding(measure, name):
     assert measure(*WITHOUT_SPREAD[name]) == 1
 
 

@@ -78,7 +78,7 @@ def test_decomposition_scales_with_the_unit_and_not_with_the_order():
     np.testing.assert_allclose(sum(single), one.total)
 
 
-def test_decomposition_of_identical_performances():
+def test_decomposition_of_identical_trials():
     same = np.ones((3, 9, 2))
     for x in (same, 0 * same):
         found = amplitude_phase_variance(x, x)

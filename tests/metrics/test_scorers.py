@@ -40,8 +40,8 @@ def bunch():
 
 @pytest.fixture(scope="module")
 def points(bunch):
-    postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-    return ASpace(6).fit_transform(postures)
+    poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    return ASpace(6).fit_transform(poses)
 
 
 KINDS = {"array": np.asarray, "list": list, "tuple": tuple}
@@ -316,7 +316,7 @@ def test_scorer_keeps_requests_when_cloned_and_pickled(scorer, bunch, points):
 
 
 @pytest.mark.parametrize("scorer", SCORERS)
-def test_scorer_refuses_one_performance(scorer, points):
+def test_scorer_refuses_one_trial(scorer, points):
     message = f"{scorer.__name__} measures how much .* at least 2: instead of LeaveOneOut use"
     with pytest.raises(ValueError, match=message):
         scorer()(LinearSynchronizer(40).fit(points), points[:1])
@@ -370,7 +370,7 @@ def test_hidden_values_do_not_count_in_the_spread():
 
 
 @pytest.mark.parametrize("scorer", [SpreadScorer(), FeatureHoldoutScorer()])
-def test_scores_of_performances_with_gaps(scorer):
+def test_scores_of_trials_with_gaps(scorer):
     X = [x[:, 6:18] for x in make_bending(8, random_state=0).data]
     gappy = [x.copy() for x in X]
     for i, x in enumerate(gappy):

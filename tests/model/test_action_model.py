@@ -7,8 +7,8 @@ from sklearn_motionsync import ActionModel
 
 
 @pytest.fixture(scope="module")
-def performances():
-    """200 performances of 15 frames x 3 features, smooth, of unequal variance."""
+def trials():
+    """200 trials of 15 frames x 3 features, smooth, of unequal variance."""
     rng = np.random.default_rng(0)
     t = np.linspace(0, 1, 15)
     shapes = np.stack([np.ones_like(t), t, t**2])
@@ -17,26 +17,26 @@ def performances():
 
 
 @pytest.fixture(scope="module")
-def model(performances):
-    return ActionModel().fit(performances)
+def model(trials):
+    return ActionModel().fit(trials)
 
 
-def test_density_equals_that_of_normal_distributions(model, performances):
-    expected = norm(performances.mean(axis=0), performances.std(axis=0)).logpdf(performances)
-    np.testing.assert_allclose(model.score_samples(performances), expected.sum(axis=(1, 2)))
-    np.testing.assert_allclose(model.score(performances), expected.sum(axis=(1, 2)).mean())
+def test_density_equals_that_of_normal_distributions(model, trials):
+    expected = norm(trials.mean(axis=0), trials.std(axis=0)).logpdf(trials)
+    np.testing.assert_allclose(model.score_samples(trials), expected.sum(axis=(1, 2)))
+    np.testing.assert_allclose(model.score(trials), expected.sum(axis=(1, 2)).mean())
 
 
-def test_accepts_postures_inside_in_every_feature(model):
+def test_accepts_poses_inside_in_every_feature(model):
     mean, std = model.mean_[4], np.sqrt(model.variance_[4])
-    postures = [mean, mean + 2.99 * std, mean - 2.99 * std, mean + [0, 0, 3.01] * std]
-    assert model.accepts(postures, 4).tolist() == [True, True, True, False]
-    assert model.accepts(np.array(postures), np.int64(4)).dtype == bool
+    poses = [mean, mean + 2.99 * std, mean - 2.99 * std, mean + [0, 0, 3.01] * std]
+    assert model.accepts(poses, 4).tolist() == [True, True, True, False]
+    assert model.accepts(np.array(poses), np.int64(4)).dtype == bool
 
 
-def test_postures_are_compared_in_the_precision_of_the_model(performances):
+def test_poses_are_compared_in_the_precision_of_the_model(trials):
     """One at the bound is accepted, however many digits it is given with."""
-    model = ActionModel().fit(performances.astype("f4"))
+    model = ActionModel().fit(trials.astype("f4"))
     lower, upper = (bound[4].astype("f8") for bound in model.envelope())
     assert model.accepts([lower - 1e-12, upper + 1e-12], 4).all()
     assert not model.accepts([lower - 1e-3, upper + 1e-3], 4).any()
@@ -45,17 +45,17 @@ def test_postures_are_compared_in_the_precision_of_the_model(performances):
 # -- scores and samples ------------------------------------------------------------------
 
 
-def test_score_weights_performances(model, performances):
+def test_score_weights_trials(model, trials):
     weights = np.arange(5.0)
-    expected = (weights * model.score_samples(performances[:5])).sum() / weights.sum()
-    np.testing.assert_allclose(model.score(performances[:5], sample_weight=weights), expected)
+    expected = (weights * model.score_samples(trials[:5])).sum() / weights.sum()
+    np.testing.assert_allclose(model.score(trials[:5], sample_weight=weights), expected)
     with pytest.raises(ValueError, match="inconsistent numbers of samples"):
-        model.score(performances[:5], sample_weight=[1, 2])
+        model.score(trials[:5], sample_weight=[1, 2])
 
 
 @pytest.mark.parametrize("n_std", [0.3, 3.0])
-def test_samples_are_accepted(performances, n_std):
-    model = ActionModel(n_std).fit(performances)
+def test_samples_are_accepted(trials, n_std):
+    model = ActionModel(n_std).fit(trials)
     assert model.accepts(model.sample(400, frame=7, random_state=0), 7).all()
     drawn = model.sample(400, random_state=0)
     assert drawn.shape == (400, 15, 3)
@@ -64,26 +64,26 @@ def test_samples_are_accepted(performances, n_std):
     assert model.sample(random_state=0).shape == (1, 15, 3)
 
 
-def test_rows_are_univariate_performances(performances):
-    rows = performances[:, :, 0]
+def test_rows_are_univariate_trials(trials):
+    rows = trials[:, :, 0]
     model = ActionModel().fit(rows)
     assert model.mean_.shape == (15, 1)
     assert model.sample(4, random_state=0).shape == (4, 15)
-    columns = ActionModel().fit(performances[:, :, :1])
-    expected = columns.score_samples(performances[:, :, :1])
+    columns = ActionModel().fit(trials[:, :, :1])
+    expected = columns.score_samples(trials[:, :, :1])
     np.testing.assert_array_equal(model.score_samples(rows), expected)
 
 
 # -- limits -----------------------------------------------------------------------------
 
 
-def test_a_constant_feature_does_not_hide_the_others(performances):
-    X = performances.copy()
+def test_a_constant_feature_does_not_hide_the_others(trials):
+    X = trials.copy()
     X[:, :, 1] = 5.0
     model = ActionModel().fit(X)
     assert np.isfinite(model.score_samples(X)).all()
     assert (model.variance_[:, 1] == 0).all()
-    # A billionth of the variance of the feature that varies most, over time and performances.
+    # A billionth of the variance of the feature that varies most, over time and trials.
     floor = 1e-9 * max(X[:, :, k].var() for k in range(3))
     std = np.sqrt(np.maximum(X.var(axis=0), floor))
     expected = norm(X.mean(axis=0), std).logpdf(X).sum(axis=(1, 2))
@@ -98,10 +98,10 @@ def test_a_constant_feature_does_not_hide_the_others(performances):
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
-def test_the_unit_of_the_features_changes_nothing(performances, scale):
-    """Densities change by the Jacobian, decisions do not; also of identical performances."""
-    same = np.repeat(performances[:1], 4, axis=0)
-    for X in (performances, same):
+def test_the_unit_of_the_features_changes_nothing(trials, scale):
+    """Densities change by the Jacobian, decisions do not; also of identical trials."""
+    same = np.repeat(trials[:1], 4, axis=0)
+    for X in (trials, same):
         model, other = ActionModel().fit(X), ActionModel().fit(scale * X)
         new = X[:3] + [[[0.0]], [[0.1]], [[5.0]]]
         change = X[0].size * np.log(scale)
@@ -112,7 +112,7 @@ def test_the_unit_of_the_features_changes_nothing(performances, scale):
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, 1e6])
-def test_model_of_identical_performances(value):
+def test_model_of_identical_trials(value):
     X = [np.full((5, 2), value)] * 3
     model = ActionModel().fit(X)
     assert np.isfinite(model.score_samples(X)).all()
@@ -128,10 +128,10 @@ def test_accepts_and_sample_refuse_frames_outside(model, frame):
             ask()
 
 
-@pytest.mark.parametrize("postures", [[0.0, 0, 0], [[0.0, 0]], [[np.inf, 0, 0]]])
-def test_accepts_refuses_invalid_postures(model, postures):
-    with pytest.raises(ValueError, match="postures"):
-        model.accepts(postures, 0)
+@pytest.mark.parametrize("poses", [[0.0, 0, 0], [[0.0, 0]], [[np.inf, 0, 0]]])
+def test_accepts_refuses_invalid_poses(model, poses):
+    with pytest.raises(ValueError, match="poses"):
+        model.accepts(poses, 0)
 
 
 @pytest.mark.parametrize("n", [0, -1, 2.5])

@@ -66,7 +66,7 @@ def test_departures_are_runs_of_frames_the_worst_first():
         (2, "x1", 7, 7, 7, -40),
         (2, "x0", 7, 7, 7, 20),
     ]
-    names = ["performance", "feature", "first", "last", "peak", "deviation"]
+    names = ["trial", "feature", "first", "last", "peak", "deviation"]
     expected = pd.DataFrame(rows, columns=names).assign(rare=True, timing=False)
     expected = expected.assign(kind="value", unit="")
     pd.testing.assert_frame_equal(
@@ -76,7 +76,7 @@ def test_departures_are_runs_of_frames_the_worst_first():
     std = np.sqrt(MODEL.predictive_variance_)
     sizes = [-50 * std[20:30, 0].mean(), 30 * std[3:6, 0].mean(), -40 * std[7, 1], 20 * std[7, 0]]
     np.testing.assert_allclose(table["size"], sizes, rtol=0.03)
-    assert table.dtypes[["performance", "first", "last", "peak"]].eq(np.int64).all()
+    assert table.dtypes[["trial", "first", "last", "peak"]].eq(np.int64).all()
 
 
 def test_departures_of_chosen_features_and_limits():
@@ -93,7 +93,7 @@ def test_departures_of_chosen_features_and_limits():
 def test_few_new_people_have_rare_departures():
     new, _ = people([1] * 100, 77, n_frames=30)
     table = find_departures(MODEL, new)
-    of_some = table.groupby("performance")["rare"].any()
+    of_some = table.groupby("trial")["rare"].any()
     # Two in three people have evidence that is listed, and 5 % rare evidence.
     assert 0.3 * 100 < len(of_some) < 0.8 * 100
     assert of_some.sum() < 0.12 * 100
@@ -102,7 +102,7 @@ def test_few_new_people_have_rare_departures():
     assert (beyond["deviation"].abs() > 3).all()
     moved = new[:40].copy()
     moved[:, 10:15, 0] += 15 * np.sqrt(MODEL.predictive_variance_[10:15, 0])
-    first = find_departures(MODEL, moved).groupby("performance").head(1)
+    first = find_departures(MODEL, moved).groupby("trial").head(1)
     assert first["rare"].mean() > 0.95
     assert (first["feature"] == "x0").mean() > 0.95
 
@@ -127,7 +127,7 @@ def test_departures_of_a_pipeline_are_those_of_limbs(pipe):
     table = find_departures(pipe, [bunch.data[0], x.reshape(len(x), -1)])
     # Though it is no movement of the four-dimensional aSpace.
     rare = table[table["rare"]]
-    assert set(rare["performance"]) == {1}
+    assert set(rare["trial"]) == {1}
     assert set(rare["feature"]) <= {
         f"left_{limb}_{axis}" for limb in ("arm", "forearm") for axis in "xyz"
     }
@@ -136,7 +136,7 @@ def test_departures_of_a_pipeline_are_those_of_limbs(pipe):
     assert set(own["feature"]) <= {"aspace0", "aspace1"}
 
 
-def test_departures_keep_the_labels_of_performances(pipe):
+def test_departures_keep_the_labels_of_trials(pipe):
     frames = {"walk": 0, "run": 1}
     table = pd.concat(
         {name: pd.DataFrame(departing()[i], columns=["hip", "knee"]) for name, i in frames.items()},
@@ -145,7 +145,7 @@ def test_departures_keep_the_labels_of_performances(pipe):
     known = pd.concat({i: pd.DataFrame(x, columns=["hip", "knee"]) for i, x in enumerate(X)})
     model = ActionModel().fit(known, groups=GROUPS)
     found = find_departures(model, table)
-    assert set(found["performance"]) == {"run"}
+    assert set(found["trial"]) == {"run"}
     assert set(found["feature"]) == {"hip"}
 
 

@@ -40,7 +40,7 @@ def wave(n_frames=60, size=1.0, middle=0.5):
 
 
 def people(n=20, seed=0):
-    """Performances of five people, who differ in what each does alike."""
+    """Trials of five people, who differ in what each does alike."""
     rng = np.random.default_rng(seed)
     groups = np.arange(n) % 5
     length, size = 60 * np.exp(0.1 * rng.standard_normal(5)), np.exp(0.1 * rng.standard_normal(5))
@@ -127,12 +127,12 @@ def test_report_equals_slow_loops(duration, n_tests, grouped):
     curves = warped.transform(X), codes, warped.transform(new)
     np.testing.assert_allclose(report["reversal"], slow_reversal(*curves), rtol=1e-7)
 
-    def energy(performances):
-        on_clock = LinearSynchronizer(30).fit(X).transform(performances)
+    def energy(trials):
+        on_clock = LinearSynchronizer(30).fit(X).transform(trials)
         return np.array([((x - x.mean(axis=0)) ** 2).sum(axis=1).mean() for x in on_clock])
 
-    def frames(performances):
-        return np.array([len(x) for x in performances])
+    def frames(trials):
+        return np.array([len(x) for x in trials])
 
     for name, measure in [("energy", energy), *([("duration", frames)] if duration else [])]:
         middle, reach, left = slow_interval(measure(X), codes, each)
@@ -209,8 +209,8 @@ def test_bends_of_a_new_person_are_accepted_and_altered_ones_rejected(bends):
         "still": [np.repeat(x[:1], len(x), axis=0) for x in own],
         "in slow motion": [np.repeat(x, 4, axis=0) for x in own],
     }
-    for name, performances in wrong.items():
-        assert (detector.predict(performances) == -1).mean() > 0.9, name
+    for name, trials in wrong.items():
+        assert (detector.predict(trials) == -1).mean() > 0.9, name
     slow = detector.report(wrong["in slow motion"])
     assert (slow["reason"] == "too long").mean() > 0.9
 
@@ -269,7 +269,7 @@ def test_groups_reach_the_model_and_the_detector():
     assert detector.borders_ != ActionDetector(pipe).fit(BUNCH.data).borders_
 
 
-def test_detector_in_cross_validation_with_wrong_performances(detector):
+def test_detector_in_cross_validation_with_wrong_trials(detector):
     wrong = [wave(middle=m) for m in np.linspace(0.85, 0.95, 10)]
     y = np.repeat([1, -1], [len(X), len(wrong)])
     own = np.arange(len(X))
@@ -312,7 +312,7 @@ def test_key_frames_reach_the_synchronizer(routed):
 
 
 def test_report_keeps_the_labels_of_a_table(detector):
-    table = to_frame([wave(), wave(120)], performances=[("ann", 1), ("bob", 2)])
+    table = to_frame([wave(), wave(120)], trials=[("ann", 1), ("bob", 2)])
     table.columns = ["x", "y"]
     named = to_frame(X)
     named.columns = ["x", "y"]
@@ -328,7 +328,7 @@ def test_report_keeps_the_labels_of_a_table(detector):
     assert list(pandas.index) == [0, 1]
 
 
-def test_report_does_not_depend_on_other_performances(detector):
+def test_report_does_not_depend_on_other_trials(detector):
     new = [*people(70, seed=3)[0], *WRONG.values()]
     together = detector.report(new)
     for i in (0, 1, 69, 70, 77):

@@ -28,7 +28,7 @@ def match_within(half_width, n=1):
 
 
 def departure(first, last):
-    """Of the only feature of the first performance."""
+    """Of the only feature of the first trial."""
     return Departure(0, "value", None, None, 0, first, last, first, 1.0, "", 10.0, True)
 
 
@@ -54,21 +54,21 @@ def test_a_value_that_never_comes_is_not_timing():
 def test_a_lifted_forearm_is_no_timing_and_departures_of_people_often_are(bends):
     """Actors held out: their departures, and those of a forearm that points up for most of it."""
     skeleton = DirectionCosines(bends.skeleton).fit(bends.data)
-    postures = skeleton.transform(bends.data)
+    poses = skeleton.transform(bends.data)
     known, new = np.flatnonzero(bends.actor != "tr")[::2], np.flatnonzero(bends.actor == "tr")
     pipe = make_pipeline(ASpace(), DenseSynchronizer(40), ActionModel())
-    pipe.fit([postures[i] for i in known], actionmodel__groups=bends.actor[known])
+    pipe.fit([poses[i] for i in known], actionmodel__groups=bends.actor[known])
     names = list(skeleton.get_feature_names_out())
     arm = [i for i, name in enumerate(names) if name.startswith("left_forearm")]
-    lifted = [postures[i].copy() for i in new]
+    lifted = [poses[i].copy() for i in new]
     for x in lifted:
         x[len(x) // 3 :, arm] = 0, 1, 0
     of_arm = find_departures(pipe, lifted)
     of_arm = of_arm[of_arm["feature"].isin([f"x{i}" for i in arm])]
-    of_arm = of_arm.groupby("performance").head(1)
-    assert of_arm["performance"].nunique() == len(new)
+    of_arm = of_arm.groupby("trial").head(1)
+    assert of_arm["trial"].nunique() == len(new)
     assert of_arm["timing"].mean() < 0.2
-    untouched = find_departures(pipe, [postures[i] for i in new], limit=2)
+    untouched = find_departures(pipe, [poses[i] for i in new], limit=2)
     assert untouched["timing"].mean() > 0.3
 
 

@@ -6,7 +6,7 @@ from sklearn_motionsync.model.faults import (
     Expectation,
     FaultFinder,
     Part,
-    expected_performance,
+    expected_trial,
     windows_of,
 )
 from sklearn_motionsync.model.variation import predictive_variance, within_variance
@@ -16,7 +16,7 @@ PARTS = [Part("one", [0, 1], [0, 1], None), Part("two", [2], [2], None)]
 
 
 def people(n_people, n_own, seed=0):
-    """Smooth performances with three columns about a common mean, and whose they are."""
+    """Smooth trials with three columns about a common mean, and whose they are."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, K)[:, np.newaxis]
     mean = np.column_stack([np.sin(6 * t), np.cos(6 * t), 2 * np.sin(3 * t)])
@@ -31,7 +31,7 @@ def people(n_people, n_own, seed=0):
 
 def test_the_expected_mean_lies_between_others_and_the_reference():
     X, groups = people(6, 4)
-    mean, variance = expected_performance(X, groups)
+    mean, variance = expected_trial(X, groups)
     np.testing.assert_array_equal(mean, X.mean(axis=0))
     np.testing.assert_array_equal(variance, predictive_variance(X, groups))
     within = within_variance(X, groups)
@@ -39,7 +39,7 @@ def test_the_expected_mean_lies_between_others_and_the_reference():
     for n in (1, 3):
         own = np.repeat(X[:1] + 0.2, n, axis=0)
         share = between / (between + within / n)
-        expected, spread = expected_performance(X, groups, own)
+        expected, spread = expected_trial(X, groups, own)
         np.testing.assert_allclose(expected, mean + share * (own[0] - mean))
         np.testing.assert_allclose(spread, within * (1 + share / n))
 
@@ -48,7 +48,7 @@ def test_a_reference_that_disagrees_counts_less():
     X, groups = people(6, 4)
     own = X[:2] + 0.2
     apart = own + np.array([0.3, -0.3])[:, np.newaxis, np.newaxis]
-    near, far = (expected_performance(X, groups, r) for r in (own, apart))
+    near, far = (expected_trial(X, groups, r) for r in (own, apart))
     mean = X.mean(axis=0)
     assert (np.abs(far[0] - mean) < np.abs(near[0] - mean)).mean() > 0.95
     assert (far[1] > near[1]).all()

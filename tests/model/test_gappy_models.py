@@ -1,4 +1,4 @@
-"""Action models of performances with gaps, against marginal distributions and plain loops."""
+"""Action models of trials with gaps, against marginal distributions and plain loops."""
 
 import numpy as np
 import pandas as pd
@@ -24,8 +24,8 @@ from test_similarity import slow_weights
 P = 40
 
 
-def performances(n, seed=0, people=None):
-    """Synchronised performances of three features; people differ in amplitude and offset."""
+def trials(n, seed=0, people=None):
+    """Synchronised trials of three features; people differ in amplitude and offset."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, P)[:, np.newaxis]
     codes = np.arange(n) if people is None else people
@@ -37,7 +37,7 @@ def performances(n, seed=0, people=None):
 
 
 def hide(X, seed=0, share=0.3, length=12):
-    """Copies: a feature of every third performance or so is hidden for a while."""
+    """Copies: a feature of every third trial or so is hidden for a while."""
     rng, X = np.random.default_rng(seed), X.copy()
     for x in X:
         for k in range(X.shape[2]):
@@ -49,7 +49,7 @@ def hide(X, seed=0, share=0.3, length=12):
 
 @pytest.fixture(scope="module")
 def gaps():
-    return hide(performances(12), share=0.4)
+    return hide(trials(12), share=0.4)
 
 
 # -- moments, density ---------------------------------------------------------------------
@@ -64,7 +64,7 @@ def test_mean_variance_and_share_are_those_of_what_was_seen(gaps):
 
 def test_density_is_the_marginal_one_of_what_was_seen(gaps):
     model = ActionModel().fit(gaps)
-    new = hide(performances(5, seed=3), seed=4, share=0.8)
+    new = hide(trials(5, seed=3), seed=4, share=0.8)
     mean, variance = model.mean_.ravel(), model.variance_.ravel()
     expected = []
     for x in new.reshape(5, -1):
@@ -74,13 +74,13 @@ def test_density_is_the_marginal_one_of_what_was_seen(gaps):
     np.testing.assert_allclose(model.score_samples(new), expected, rtol=1e-10)
     np.testing.assert_allclose(model.score(new), np.mean(expected), rtol=1e-10)
     # Others of the same call are as without gaps.
-    whole = performances(2, seed=3)
+    whole = trials(2, seed=3)
     alone = model.score_samples(whole)
     np.testing.assert_array_equal(model.score_samples([*whole, new[0]])[:2], alone)
 
 
 def test_without_gaps_nothing_goes_the_other_way(monkeypatch):
-    X = performances(8)
+    X = trials(8)
     whole = ActionModel().fit(X)
     names = ["fill_with_mean", "group_counts"]
     for module in ("action_model", "similarity", "variation"):
@@ -96,7 +96,7 @@ def test_without_gaps_nothing_goes_the_other_way(monkeypatch):
 
 def test_with_nearly_nothing_missing_results_are_nearly_those_without():
     """The way of gaps and the plain way are one: a value is hidden that hardly matters."""
-    X = performances(12)
+    X = trials(12)
     gap = X.copy()
     gap[3, 17, 1] = np.nan
     a, b = ActionModel().fit(X), ActionModel().fit(gap)
@@ -133,7 +133,7 @@ def slow_predictive_variance(X, groups):
 
 @pytest.mark.parametrize("people", [None, np.arange(12) // 2])
 def test_predictive_variance_leaves_groups_out_value_by_value(people):
-    X = hide(performances(12, people=people), share=0.4)
+    X = hide(trials(12, people=people), share=0.4)
     groups = np.arange(12) if people is None else people
     np.testing.assert_allclose(
         predictive_variance(X, groups), slow_predictive_variance(X, groups), rtol=1e-10
@@ -141,10 +141,10 @@ def test_predictive_variance_leaves_groups_out_value_by_value(people):
 
 
 def test_bands_of_the_mean_hold_it_and_are_wider_where_few_were_seen():
-    truth = performances(4000, seed=99).mean(axis=0)
+    truth = trials(4000, seed=99).mean(axis=0)
     held = []
     for seed in range(20):
-        X = performances(8, seed=seed)
+        X = trials(8, seed=seed)
         X[:5, 10:20, 1] = np.nan
         half = mean_band(X, np.arange(8), 0.9, 0)
         held.append((np.abs(np.nanmean(X, axis=0) - truth) <= half).all())
@@ -156,7 +156,7 @@ def test_bands_of_the_mean_hold_it_and_are_wider_where_few_were_seen():
 
 
 def slow_dissimilarity(y, known, mean):
-    """Of one performance to each known one: sums over what was seen of both, frame by frame."""
+    """Of one trial to each known one: sums over what was seen of both, frame by frame."""
 
     def fill(x):
         x = pd.DataFrame(x - mean).interpolate(limit_direction="both").fillna(0).to_numpy()
@@ -178,12 +178,12 @@ def slow_dissimilarity(y, known, mean):
 
 def test_dissimilarity_compares_what_was_seen_of_both(gaps):
     model = ActionModel().fit(gaps)
-    new = [*hide(performances(4, seed=3), seed=4, share=0.8), *performances(2, seed=8)]
+    new = [*hide(trials(4, seed=3), seed=4, share=0.8), *trials(2, seed=8)]
     expected = [slow_dissimilarity(y, gaps, model.mean_) for y in new]
     np.testing.assert_allclose(model.dissimilarity(new), expected, rtol=1e-9)
     # A model that was fitted without gaps.
-    whole = ActionModel().fit(performances(12))
-    expected = [slow_dissimilarity(y, performances(12), whole.mean_) for y in new]
+    whole = ActionModel().fit(trials(12))
+    expected = [slow_dissimilarity(y, trials(12), whole.mean_) for y in new]
     np.testing.assert_allclose(whole.dissimilarity(new), expected, rtol=1e-9)
     np.testing.assert_array_equal(whole.dissimilarity(new)[4:], whole.dissimilarity(new[4:]))
 
@@ -192,7 +192,7 @@ def test_gaps_neither_accept_nor_reject():
     """Of new people, as many are accepted with gaps; what is another movement stays refused."""
     accepted = {"whole": [], "gaps": [], "backwards": [], "still": []}
     for seed in range(6):
-        X = performances(30, seed=seed)
+        X = trials(30, seed=seed)
         model = ActionModel(coverage=0.9).fit(hide(X[:10], seed=seed))
         new = X[10:]
         kinds = {
@@ -209,7 +209,7 @@ def test_gaps_neither_accept_nor_reject():
     assert shares["backwards"] == shares["still"] == 0
 
 
-def test_one_path_a_performance(gaps):
+def test_one_path_a_trial(gaps):
     model = ActionModel().fit(gaps)
     together = model.dissimilarity(gaps)
     for x, value in zip(gaps, together, strict=True):
@@ -219,21 +219,21 @@ def test_one_path_a_performance(gaps):
 # -- the rest of the interface ------------------------------------------------------------
 
 
-def test_scores_postures_and_samples(gaps):
+def test_scores_poses_and_samples(gaps):
     model = ActionModel().fit(gaps)
     assert np.isfinite(model.deviations_).all()
     assert np.isfinite(model.sample(3, random_state=0)).all()
     assert np.isfinite(model.sample(3, frame=5, random_state=0)).all()
     assert all(np.isfinite(band).all() for band in model.envelope(simultaneous=True))
     mean = model.mean_[7]
-    postures = [
+    poses = [
         mean,
         mean + [0, 9, 0],
         [np.nan, *mean[1:]],
         [np.nan, *(mean[1:] + 9)],
         [np.nan] * 3,
     ]
-    assert model.accepts(postures, frame=7).tolist() == [True, False, True, False, True]
+    assert model.accepts(poses, frame=7).tolist() == [True, False, True, False, True]
 
 
 def test_portions_give_the_same_to_the_last_bit(gaps):
@@ -248,11 +248,11 @@ def test_portions_give_the_same_to_the_last_bit(gaps):
 # -- what is refused ----------------------------------------------------------------------
 
 
-def test_a_value_that_one_performance_shows_is_refused():
-    X = performances(6)
+def test_a_value_that_one_trial_shows_is_refused():
+    X = trials(6)
     X[1:, 10:14, 2] = np.nan
     message = (
-        "Frame 10, feature 2 was seen in 1 performance, and at least 2 tell how it varies: "
+        "Frame 10, feature 2 was seen in 1 trial, and at least 2 tell how it varies: "
         "4 values of 120 are so"
     )
     with pytest.raises(ValueError, match=message):
@@ -266,14 +266,12 @@ def test_a_value_that_one_performance_shows_is_refused():
 
 
 def test_a_value_that_is_not_known_yet_waits_for_others():
-    X = performances(6)
+    X = trials(6)
     X[:3, 10:14, 2] = np.nan
     model = ActionModel().partial_fit(X[:3])
     assert np.isnan(model.mean_[10:14, 2]).all()
     assert np.isfinite(np.delete(model.mean_[:, 2], range(10, 14))).all()
-    with pytest.raises(
-        NotFittedError, match=r"was seen in 0 performances.*Give others to partial_fit"
-    ):
+    with pytest.raises(NotFittedError, match=r"was seen in 0 trials.*Give others to partial_fit"):
         model.predict(X)
     model.partial_fit(X[3:])
     assert model.predict(X).shape == (6,)
@@ -281,11 +279,11 @@ def test_a_value_that_is_not_known_yet_waits_for_others():
 
 
 @pytest.mark.parametrize("when", ["fit", "after"])
-def test_a_performance_that_shows_nothing_is_refused(when):
-    X = performances(6)
+def test_a_trial_that_shows_nothing_is_refused(when):
+    X = trials(6)
     model = ActionModel().fit(X)
     X[4] = np.nan
-    with pytest.raises(ValueError, match="Performance 4 is NaN in every frame and feature"):
+    with pytest.raises(ValueError, match="Trial 4 is NaN in every frame and feature"):
         clone(model).fit(X) if when == "fit" else model.predict(X)
 
 
@@ -293,20 +291,20 @@ def test_a_performance_that_shows_nothing_is_refused(when):
 
 
 def test_departures_are_those_of_what_was_seen():
-    X = performances(10)
+    X = trials(10)
     model = ActionModel().fit(X)
-    new = performances(3, seed=5)
+    new = trials(3, seed=5)
     new[1, 10:20, 1] += 5
     new[2, 10:20, 1] += 5
     new[2, 13:16, 1] = np.nan
     table = find_departures(model, new)
-    runs = table[table["feature"] == "x1"][["performance", "first", "last"]].to_numpy().tolist()
+    runs = table[table["feature"] == "x1"][["trial", "first", "last"]].to_numpy().tolist()
     assert [1, 10, 19] in runs
     # A fault lasts over a gap, and begins and ends in what was seen.
     assert [2, 10, 19] in runs
     new[2, 10:13, 1] = np.nan
     table = find_departures(model, new)
-    runs = table[table["feature"] == "x1"][["performance", "first", "last"]].to_numpy().tolist()
+    runs = table[table["feature"] == "x1"][["trial", "first", "last"]].to_numpy().tolist()
     assert [2, 16, 19] in runs
     assert [2, 10, 19] not in runs
 

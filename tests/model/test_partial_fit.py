@@ -1,4 +1,4 @@
-"""partial_fit: against one fit on all performances, and against slow loops."""
+"""partial_fit: against one fit on all trials, and against slow loops."""
 
 import math
 import pickle
@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import ActionModel, find_departures, to_frame
-from sklearn_motionsync.model.similarity import PerformanceStream
+from sklearn_motionsync.model.similarity import TrialStream
 from test_similarity import (
     curves,
     slow_dissimilarity,
@@ -74,7 +74,7 @@ def test_partial_fits_equal_one_fit_to_the_last_bit(data):
 
 
 @pytest.mark.parametrize("size", [1, 50])
-def test_kept_performances_do_not_depend_on_portions(size):
+def test_kept_trials_do_not_depend_on_portions(size):
     X, groups = curves(80, n_frames=10), np.arange(80) ** 2 // 150
     for some in (None, groups):
         model = in_portions(X, some, range(0, 80, size))
@@ -110,7 +110,7 @@ def test_partial_fit_continues_a_fit_and_fit_forgets():
 
 
 def test_a_label_is_the_same_group_in_all_calls():
-    """Performances without a label are groups of their own, also in between."""
+    """Trials without a label are groups of their own, also in between."""
     X = curves(9, n_frames=10)
     model = ActionModel().partial_fit(X[:3], groups=["b", "a", "b"])
     model.partial_fit(X[3:5]).partial_fit(X[5:], groups=np.array(["a", "c", "b", "a"]))
@@ -118,13 +118,13 @@ def test_a_label_is_the_same_group_in_all_calls():
     assert_same_state(model, ActionModel().fit(X, groups=list("bab12acba")))
 
 
-# -- performances kept -------------------------------------------------------------------
+# -- trials kept -------------------------------------------------------------------
 
 
 def kept_of(groups):
-    """Indices of the performances of these groups that a stream keeps."""
+    """Indices of the trials of these groups that a stream keeps."""
     X = np.zeros((len(groups), 2, 1))
-    return np.flatnonzero(PerformanceStream.starting_at(X[0]).extend(X, groups)[2])
+    return np.flatnonzero(TrialStream.starting_at(X[0]).extend(X, groups)[2])
 
 
 def slow_choice(groups, most=64):
@@ -140,7 +140,7 @@ def slow_choice(groups, most=64):
 
 
 @pytest.mark.parametrize("groups", [[0] * 500, list(range(300)), [i // 4 for i in range(700)]])
-def test_kept_performances_are_evenly_spread(groups):
+def test_kept_trials_are_evenly_spread(groups):
     kept = kept_of(groups)
     assert kept.tolist() == slow_choice(groups)
     # At three distances, none of them above twice the mean.
@@ -152,7 +152,7 @@ def test_kept_performances_are_evenly_spread(groups):
 # -- the threshold ----------------------------------------------------------------------
 
 
-def test_dropped_performances_keep_their_dissimilarity_in_the_threshold():
+def test_dropped_trials_keep_their_dissimilarity_in_the_threshold():
     """In two portions, each with more than are kept, by loops."""
     X, groups = curves(72, n_frames=8), np.arange(72) % 9
     edges, kept, values = [0, 68, 72], [], {}
@@ -168,7 +168,7 @@ def test_dropped_performances_keep_their_dissimilarity_in_the_threshold():
     np.testing.assert_allclose(model.threshold_, slow_threshold(list(values.values()), 0.95))
     last = [values[i] for i in range(68, 72)]
     np.testing.assert_allclose(model.dissimilarities_, last, rtol=1e-9)
-    # In one fit earlier performances are compared with others.
+    # In one fit earlier trials are compared with others.
     expected = ActionModel().fit(X, groups=groups).threshold_
     assert model.threshold_ != expected
     np.testing.assert_allclose(model.threshold_, expected, rtol=0.1)
@@ -183,10 +183,10 @@ def test_a_single_group_gives_moments_only(groups):
     np.testing.assert_allclose(model.mean_, X[:n].mean(axis=0))
     np.testing.assert_allclose(model.variance_, X[:n].var(axis=0), atol=1e-15)
     methods = dict.fromkeys(["predict", "score_samples", "dissimilarity"], (X,))
-    methods |= {"accepts": [X[0, :2], 0], "check_performances": [X]}
+    methods |= {"accepts": [X[0, :2], 0], "check_trials": [X]}
     methods |= dict.fromkeys(["envelope", "mean_envelope", "simultaneous_factor", "sample"], ())
     for name, arguments in methods.items():
-        with pytest.raises(NotFittedError, match=f"2 performances, .* has seen {n}, of one"):
+        with pytest.raises(NotFittedError, match=f"2 trials, .* has seen {n}, of one"):
             getattr(model, name)(*arguments)
     with pytest.raises(NotFittedError, match="not fitted yet"):
         find_departures(model, X)
@@ -196,7 +196,7 @@ def test_a_single_group_gives_moments_only(groups):
 
 
 def test_many_of_one_group_before_another():
-    """Performances that were dropped before the second group came do not enter the threshold."""
+    """Trials that were dropped before the second group came do not enter the threshold."""
     X, groups = curves(150, n_frames=10), [0] * 140 + [1] * 10
     model = in_portions(X, groups, [100, 140])
     known = [i for i in slow_choice(groups[:140]) if i < 140]
@@ -215,17 +215,17 @@ def test_many_of_one_group_before_another():
     ("X", "groups", "message"),
     [
         (curves(3, n_frames=11), None, "have 11 frames, the model 10"),
-        ([np.zeros((10, 2)), np.zeros((9, 2))], None, "Performance 1 has 9 frames"),
-        (np.full((3, 10, 2), np.nan), None, "Performance 0 is NaN in every frame and feature"),
+        ([np.zeros((10, 2)), np.zeros((9, 2))], None, "Trial 1 has 9 frames"),
+        (np.full((3, 10, 2), np.nan), None, "Trial 0 is NaN in every frame and feature"),
         (np.zeros((3, 10, 3)), None, "3 features a frame, but ActionModel is expecting 2"),
         (curves(3, n_frames=10), ["a", None, "b"], r"groups\[1\] is missing, None"),
         (
             curves(3, n_frames=10),
             ["a"],
-            "one label for each performance, got 1 for 3",
+            "one label for each trial, got 1 for 3",
         ),
         (np.zeros((3, 10)), None, "wrap one sequence as"),
-        ([], None, "Found 0 performances"),
+        ([], None, "Found 0 trials"),
     ],
 )
 def test_a_refused_portion_does_not_change_the_model(X, groups, message):
@@ -235,7 +235,7 @@ def test_a_refused_portion_does_not_change_the_model(X, groups, message):
         model.partial_fit(X, groups=groups)
     assert pickle.dumps(model) == before
     model = ActionModel()
-    with pytest.raises(ValueError, match="Performance 1 has 9 frames"):
+    with pytest.raises(ValueError, match="Trial 1 has 9 frames"):
         model.partial_fit([np.zeros((10, 2)), np.zeros((9, 2))])
     with pytest.raises(NotFittedError):
         model.score_samples(curves(3, n_frames=10))
@@ -287,7 +287,7 @@ def test_single_precision_becomes_double_with_the_first_double_portion():
     assert 76 not in model.groups_
 
 
-def test_memory_of_a_fit_does_not_grow_with_the_performances():
+def test_memory_of_a_fit_does_not_grow_with_the_trials():
     """By at most a tenth of the 6400 bytes of each."""
     some = list(np.ascontiguousarray(curves(50, n_frames=200)[:, :, [0, 1] * 4], dtype="f4"))
     peaks = []

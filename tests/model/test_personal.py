@@ -12,7 +12,7 @@ P = 40
 
 
 def people(n_people, n_times, seed=0, style=0.5, repeat=0.05):
-    """Performances of people with a style, who repeat themselves nearly; (n, P, 2), and who."""
+    """Trials of people with a style, who repeat themselves nearly; (n, P, 2), and who."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, P)
     base = np.stack([np.sin(2 * np.pi * t), np.cos(3 * t)], axis=1)
@@ -38,7 +38,7 @@ def slow_ratio(y, z, weight):
 
 
 def slow_weight(X, groups):
-    """A fifth of a typical distance of poses, among the performances of a person."""
+    """A fifth of a typical distance of poses, among the trials of a person."""
     apart, offset = [], []
     for i, y in enumerate(X):
         for z in (X[j] for j in range(i) if groups[j] == groups[i]):
@@ -86,7 +86,7 @@ def test_dissimilarity_and_threshold_equal_slow_loops(m):
     np.testing.assert_array_equal(model.dissimilarity(new, None), model.dissimilarity(new))
 
 
-def test_gaps_and_other_performances_change_nothing_else():
+def test_gaps_and_other_trials_change_nothing_else():
     model, own = ActionModel().fit(X, groups=GROUPS), NEW[PERSONS == 1].copy()
     together = model.dissimilarity(own[3:], reference=own[:3])
     for y, value in zip(own[3:], together, strict=True):
@@ -99,14 +99,14 @@ def test_gaps_and_other_performances_change_nothing_else():
 def test_a_reference_needs_people_who_come_twice():
     model = ActionModel().fit(X[::5], groups=GROUPS[::5])
     for ask in (model.predict, model.dissimilarity, model.decision_function):
-        with pytest.raises(ValueError, match="no group of the training set has two performances"):
+        with pytest.raises(ValueError, match="no group of the training set has two trials"):
             ask(X, reference=NEW[:2])
     found = ActionModel().fit(X, groups=GROUPS)
-    with pytest.raises(ValueError, match="The performances have 7 frames, the model 40"):
+    with pytest.raises(ValueError, match="The trials have 7 frames, the model 40"):
         found.predict(X, reference=NEW[:2, :7])
 
 
-def test_people_with_one_performance_are_left_out_of_the_limit():
+def test_people_with_one_trial_are_left_out_of_the_limit():
     rows = [0, *range(5, 30)]
     known = PersonalReference(X[rows], GROUPS[rows], X[rows].mean(axis=0), NEW[:2])
     assert np.isnan(known.held_out[0])
@@ -155,13 +155,13 @@ def test_exercises_of_people_done_right_and_wrong(benchmark, real_data):
     """A person held out; shoulder rotation, where people differ more than right from wrong."""
     read = benchmark("exercises").read_exercises(real_data)
     found = {name: rest for name, *rest in read}
-    postures, people, correct, takes = found["shoulder rotation"]
+    poses, people, correct, takes = found["shoulder rotation"]
     train = np.flatnonzero((people != "s03") & correct & (takes % 2 == 1))
     mine = np.flatnonzero(people == "s03")
     right, rest = mine[correct[mine]][:3], np.setdiff1d(mine, mine[correct[mine]][:3])
 
     def trials(rows):
-        return [postures[i] for i in rows]
+        return [poses[i] for i in rows]
 
     pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(40), ActionModel())
     pipe.fit(trials(train), actionmodel__groups=people[train])

@@ -12,8 +12,8 @@ from sklearn_motionsync import (
 from sklearn_motionsync.model.variation import (
     TangentSpace,
     directions_in,
-    sample_performances,
-    sample_postures,
+    sample_poses,
+    sample_trials,
 )
 
 
@@ -21,24 +21,22 @@ def moments(X):
     return X.mean(axis=0), X.var(axis=0), X - X.mean(axis=0)
 
 
-def postures_of(X, n=20_000, n_std=3.0, seed=0):
-    return sample_postures(*moments(X), n, n_std, np.random.RandomState(seed))
+def poses_of(X, n=20_000, n_std=3.0, seed=0):
+    return sample_poses(*moments(X), n, n_std, np.random.RandomState(seed))
 
 
-def performances_of(X, n=200, dissimilarity=None, threshold=np.inf, seed=0):
+def trials_of(X, n=200, dissimilarity=None, threshold=np.inf, seed=0):
     dissimilarity = dissimilarity or (lambda Y: np.zeros(len(Y)))
-    return sample_performances(
-        *moments(X), n, dissimilarity, threshold, np.random.RandomState(seed)
-    )
+    return sample_trials(*moments(X), n, dissimilarity, threshold, np.random.RandomState(seed))
 
 
 def to_nearest(X):
-    """Root-mean-square distance to the nearest training performance."""
+    """Root-mean-square distance to the nearest training trial."""
     return lambda Y: np.sqrt(np.square(Y[:, None] - X).mean(axis=(2, 3)).min(axis=1))
 
 
 def waves(n=200, seed=0):
-    """Performances of 15 frames x 3 features, smooth, of unequal variance."""
+    """Trials of 15 frames x 3 features, smooth, of unequal variance."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, 15)
     shapes = np.stack([np.ones_like(t), t, t**2])
@@ -47,28 +45,28 @@ def waves(n=200, seed=0):
 
 
 def two_styles(n=20, seed=0):
-    """Performances that end up or down, none near the mean."""
+    """Trials that end up or down, none near the mean."""
     X = 0.05 * waves(n, seed)
     X[::2] += np.linspace(0, 1, 15)[:, None]
     X[1::2] -= np.linspace(0, 1, 15)[:, None]
     return X
 
 
-def inside(postures, X, n_std):
+def inside(poses, X, n_std):
     reach = n_std * np.sqrt(X.var(axis=0))
-    return (postures >= X.mean(axis=0) - reach).all() and (postures <= X.mean(axis=0) + reach).all()
+    return (poses >= X.mean(axis=0) - reach).all() and (poses <= X.mean(axis=0) + reach).all()
 
 
-# -- postures ---------------------------------------------------------------------------
+# -- poses ---------------------------------------------------------------------------
 
 
-def test_postures_have_the_covariance_of_the_training_ones():
+def test_poses_have_the_covariance_of_the_training_ones():
     """Shrunk by a fiftieth: features that go together do so in the samples."""
     rng = np.random.default_rng(0)
     X = rng.standard_normal((30, 4)) @ rng.standard_normal((4, 4)) + 5
     covariance = np.cov(X.T, bias=True)
     expected = 0.98 * covariance + 0.02 * np.diag(np.diag(covariance))
-    drawn = postures_of(X, 200_000, n_std=50)
+    drawn = poses_of(X, 200_000, n_std=50)
     size = np.sqrt(np.outer(X.var(axis=0), X.var(axis=0)))
     assert np.abs((np.cov(drawn.T) - expected) / size).max() < 0.01
     assert np.abs((drawn.mean(axis=0) - X.mean(axis=0)) / X.std(axis=0)).max() < 0.01
@@ -81,7 +79,7 @@ def test_deviations_of_a_part_of_the_training_set_are_centred():
 
     def drawn(deviations):
         random_state = np.random.RandomState(0)
-        return sample_postures(mean, variance, deviations, 500, 3.0, random_state)
+        return sample_poses(mean, variance, deviations, 500, 3.0, random_state)
 
     np.testing.assert_allclose(drawn(deviations + [1, -2, 7]), drawn(deviations), rtol=1e-12)
 
@@ -89,7 +87,7 @@ def test_deviations_of_a_part_of_the_training_set_are_centred():
 @pytest.mark.parametrize("n_std", [0.3, 1.5])
 def test_normal_features_are_cut_off_like_normal_distributions(n_std):
     X = np.random.default_rng(0).standard_normal((1000, 2)) @ [[1.0, 0.9], [0.0, 0.1]]
-    drawn = postures_of(X, 8000, n_std)
+    drawn = poses_of(X, 8000, n_std)
     assert inside(drawn, X, n_std)
     expected = X.std(axis=0) * truncnorm(-n_std, n_std).std()
     np.testing.assert_allclose(drawn.std(axis=0), expected, rtol=0.03)
@@ -99,18 +97,18 @@ def test_normal_features_are_cut_off_like_normal_distributions(n_std):
 
 @pytest.mark.parametrize("n_std", [1e-6, 0.01, 3.0, 1e3])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_every_posture_is_inside(n_std, dtype):
+def test_every_pose_is_inside(n_std, dtype):
     rng = np.random.default_rng(1)
     for X in (
         rng.standard_normal((9, 5)) ** 3,
-        np.array([[0.0, 1], [1, -1]]),  # two performances
+        np.array([[0.0, 1], [1, -1]]),  # two trials
         rng.standard_normal((5, 1)) + 1e4,  # one feature
         np.column_stack([np.full(6, 0.1), rng.standard_normal(6)]),  # a constant feature
         np.full((4, 3), 0.1),
         np.concatenate([np.zeros((4000, 1)), np.ones((1, 1))]),  # an outlier, 63 deviations away
     ):
         X = X.astype(dtype)
-        drawn = postures_of(X, 500, n_std)
+        drawn = poses_of(X, 500, n_std)
         assert (drawn.dtype, drawn.shape) == (dtype, (500, X.shape[1]))
         assert np.isfinite(drawn).all()
         assert inside(drawn, X, n_std)
@@ -119,9 +117,9 @@ def test_every_posture_is_inside(n_std, dtype):
 def test_samples_near_an_outlier_are_as_far_away_as_it_is():
     """10 deviations; the envelope of 50 does not change them."""
     X = np.eye(100)[:, :1]
-    near = [x for x in postures_of(X, 5000, n_std=50)[:, 0] if x > 0.5]
+    near = [x for x in poses_of(X, 5000, n_std=50)[:, 0] if x > 0.5]
     assert 20 < len(near) < 100
-    # The share of one training posture in the variance, 0.84, and of a mixture and noise, 0.16.
+    # The share of one training pose in the variance, 0.84, and of a mixture and noise, 0.16.
     expected = X.mean() + np.sqrt(0.84) * (1 - X.mean())
     np.testing.assert_allclose(np.mean(near), expected, atol=0.02)
     np.testing.assert_allclose(np.std(near), np.sqrt(0.16) * X.std(), rtol=0.3)
@@ -129,15 +127,15 @@ def test_samples_near_an_outlier_are_as_far_away_as_it_is():
 
 def test_constant_features_stay_constant():
     X = np.column_stack([np.full(8, 2.5), np.arange(8.0)])
-    drawn = postures_of(X, 100)
+    drawn = poses_of(X, 100)
     assert (drawn[:, 0] == 2.5).all()
     assert np.ptp(drawn[:, 1]) > 1
-    np.testing.assert_array_equal(postures_of(np.full((3, 2), 7.0), 5), np.full((5, 2), 7.0))
+    np.testing.assert_array_equal(poses_of(np.full((3, 2), 7.0), 5), np.full((5, 2), 7.0))
 
 
 def test_samples_of_two_styles_avoid_their_mean():
     X = two_styles()[:, -1]
-    drawn = postures_of(X)
+    drawn = poses_of(X)
     share = (np.abs(drawn[:, 0] - X[:, 0].mean()) < 0.2 * X[:, 0].std()).mean()
     assert share < 0.05  # 16 % of a normal distribution
     # And a person is of one style in all features.
@@ -145,24 +143,24 @@ def test_samples_of_two_styles_avoid_their_mean():
     assert (np.abs(signs.sum(axis=1)) == 3).mean() > 0.95
 
 
-# -- whole performances -----------------------------------------------------------------
+# -- whole trials -----------------------------------------------------------------
 
 
-def test_performances_vary_like_the_training_ones_and_are_as_smooth():
+def test_trials_vary_like_the_training_ones_and_are_as_smooth():
     X = waves()
-    drawn = performances_of(X, 5000)
+    drawn = trials_of(X, 5000)
     np.testing.assert_allclose(drawn.var(axis=0), X.var(axis=0), rtol=0.1)
     steps = [np.diff(Y - X.mean(axis=0), axis=1).std() for Y in (drawn, X)]
     np.testing.assert_allclose(*steps, rtol=0.1)
 
 
 @pytest.mark.parametrize("share", [1e-6, 0.05, 0.3, 0.7])
-def test_performances_are_inside(share):
+def test_trials_are_inside(share):
     """Also where the mean is not, and where hardly anything is."""
     for X in (waves(20), two_styles()):
         unlike = to_nearest(X)
         threshold = share * unlike(X.mean(axis=0, keepdims=True))[0]
-        drawn = performances_of(X, dissimilarity=unlike, threshold=threshold)
+        drawn = trials_of(X, dissimilarity=unlike, threshold=threshold)
         assert (unlike(drawn) <= threshold).all()
 
 
@@ -173,14 +171,14 @@ def test_outliers_are_no_centres_of_samples():
     def unlike(Y):
         return np.abs(Y).max(axis=(1, 2))
 
-    drawn = performances_of(X, dissimilarity=unlike, threshold=2.0)
+    drawn = trials_of(X, dissimilarity=unlike, threshold=2.0)
     assert (unlike(drawn) <= 2).all()
     assert len(np.unique(drawn.round(6), axis=0)) > len(X) / 2
 
 
 def test_without_any_inside_samples_are_the_most_typical_one():
     X = waves(6)
-    drawn = performances_of(X, 3, lambda Y: 1 + np.abs(Y - X[4]).max(axis=(1, 2)), threshold=0.5)
+    drawn = trials_of(X, 3, lambda Y: 1 + np.abs(Y - X[4]).max(axis=(1, 2)), threshold=0.5)
     np.testing.assert_allclose(drawn, np.repeat(X[4:5], 3, axis=0))
 
 
@@ -191,10 +189,10 @@ def test_dissimilarity_is_evaluated_at_most_five_times():
         evaluated.append(len(Y))
         return np.ones(len(Y))
 
-    performances_of(waves(6), 10, unlike, 0.5)
+    trials_of(waves(6), 10, unlike, 0.5)
     assert evaluated == [6, 10, 10, 10, 10]
     evaluated.clear()
-    performances_of(waves(6), 10, unlike, 1.5)
+    trials_of(waves(6), 10, unlike, 1.5)
     assert evaluated == [6, 10]
 
 
@@ -204,7 +202,7 @@ def test_dissimilarity_is_evaluated_at_most_five_times():
 )
 def test_degenerate_training_sets(X, dtype):
     X = X.astype(dtype)
-    drawn = performances_of(X, 7, to_nearest(X), 1e-3)
+    drawn = trials_of(X, 7, to_nearest(X), 1e-3)
     assert (drawn.dtype, drawn.shape) == (dtype, (7, *X.shape[1:]))
     assert (to_nearest(X)(drawn) <= 1e-3).all()
 
@@ -212,7 +210,7 @@ def test_degenerate_training_sets(X, dtype):
 def test_variance_of_samples_is_scaled_by_at_most_four():
     mean, variance, deviations = moments(waves())
     for factor, expected in ((1.5, 1.5), (0.9, 0.9), (100, 4), (0.001, 0.25), (0, 0.25)):
-        drawn = sample_performances(
+        drawn = sample_trials(
             mean,
             factor * variance,
             deviations + 0.5,
@@ -247,7 +245,7 @@ def norms(X, columns=((1, 4), (4, 7))):
 
 def test_directions_keep_their_length_and_vary_as_those_of_people():
     X = turning(200)
-    drawn = performances_of(X, 4000)
+    drawn = trials_of(X, 4000)
     np.testing.assert_allclose(norms(drawn), 1, atol=1e-12)
     # Numbers between them have the variance of all, and so have angles from any direction.
     np.testing.assert_allclose(drawn[..., 7].var(axis=0), X[..., 7].var(axis=0), rtol=0.1)
@@ -262,11 +260,11 @@ def test_tangent_space_inverts_itself_and_leaves_out_what_is_no_tangent():
     X = turning(12).astype(np.float64)
     mean = X.mean(axis=0)
     space = TangentSpace(mean, X - mean)
-    back = space.performances(space.coordinates)
+    back = space.trials(space.coordinates)
     np.testing.assert_allclose(back, X, atol=1e-12)
-    about, along = space.performances(np.zeros_like(X)), space.coordinates.copy()
+    about, along = space.trials(np.zeros_like(X)), space.coordinates.copy()
     along[..., 1:7] += 0.7 * about[..., 1:7]
-    np.testing.assert_allclose(space.performances(along), back, atol=1e-12)
+    np.testing.assert_allclose(space.trials(along), back, atol=1e-12)
 
 
 def test_directions_in_finds_unit_vectors():
@@ -306,10 +304,10 @@ def test_directions_have_the_length_1_but_for_short_ones(share, length, is_direc
 # -- people -----------------------------------------------------------------------------
 
 
-def test_sampled_performances_of_cosines_have_whole_limbs(bends):
+def test_sampled_trials_of_cosines_have_whole_limbs(bends):
     """Of people who bend: inside, and no limb shrinks; 3.9 % did below 0.9, mixed as numbers."""
-    postures = make_pipeline(DirectionCosines(bends.skeleton), DenseSynchronizer(n_frames=50))
-    model = ActionModel().fit(postures.fit_transform(bends.data), groups=bends.actor)
+    poses = make_pipeline(DirectionCosines(bends.skeleton), DenseSynchronizer(n_frames=50))
+    model = ActionModel().fit(poses.fit_transform(bends.data), groups=bends.actor)
     drawn = model.sample(40, random_state=0)
     assert (model.predict(drawn) == 1).all()
     lengths = np.linalg.norm(drawn[..., 1:].reshape(40, 50, 12, 3), axis=3)

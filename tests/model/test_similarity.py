@@ -9,7 +9,7 @@ from sklearn_motionsync.model.acceptance import log_moments
 
 
 def curves(n, seed=0, n_frames=40, spread=0.2):
-    """Smooth performances of two features, of different amplitudes and shapes."""
+    """Smooth trials of two features, of different amplitudes and shapes."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, n_frames)
     base = np.stack([np.sin(2 * np.pi * t), np.cos(3 * t)], axis=1)
@@ -99,7 +99,7 @@ def test_a_single_neighbour_of_another_group_decides_alone():
     np.testing.assert_allclose(model.dissimilarities_, expected, rtol=1e-9)
 
 
-def test_dissimilarity_of_equal_still_opposite_and_distant_performances():
+def test_dissimilarity_of_equal_still_opposite_and_distant_trials():
     X = curves(10)
     X -= X.mean(axis=1, keepdims=True)
     model = ActionModel().fit(X)
@@ -131,7 +131,7 @@ def test_upper_limit_of_few_values_has_its_nominal_coverage(n, coverage):
 
 
 @pytest.mark.parametrize("n_features", [1, 16])
-def test_dissimilarity_does_not_depend_on_other_performances(n_features):
+def test_dissimilarity_does_not_depend_on_other_trials(n_features):
     rng = np.random.default_rng(0)
     X = np.cumsum(rng.standard_normal((30, 57, n_features)), axis=1)
     new = np.cumsum(rng.standard_normal((75, 57, n_features)), axis=1)
@@ -143,7 +143,7 @@ def test_dissimilarity_does_not_depend_on_other_performances(n_features):
 
 
 def test_single_precision_is_compared_in_double():
-    """Performances of float32 and the same numbers as float64 have equal dissimilarities."""
+    """Trials of float32 and the same numbers as float64 have equal dissimilarities."""
     X, new = (curves(n, seed=n).astype("f4") for n in (9, 70))
     model, double = ActionModel().fit(X), ActionModel().fit(X.astype("f8"))
     np.testing.assert_array_equal(model.dissimilarity(new), double.dissimilarity(new.astype("f8")))
@@ -153,8 +153,8 @@ def test_single_precision_is_compared_in_double():
 # -- limits -----------------------------------------------------------------------------
 
 
-def test_dissimilarity_of_static_performances_is_that_of_their_postures():
-    """A tenth of the squared distance, as a share of the variance of all postures."""
+def test_dissimilarity_of_static_trials_is_that_of_their_poses():
+    """A tenth of the squared distance, as a share of the variance of all poses."""
     held = np.array([0.9, 1.0, 1.1, 1.2, 1.3])
 
     def still(values):

@@ -14,7 +14,7 @@ GROUPS = np.array([3, 0, 0, 7, 7, 7, 3, 1])
 
 
 def people(sizes, seed=0, n_frames=15, n_features=2, own=0.5):
-    """Smooth performances of people who differ, with a mean of 0, and whose they are."""
+    """Smooth trials of people who differ, with a mean of 0, and whose they are."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, n_frames)
     waves = np.stack([np.ones_like(t), np.sin(3 * t), np.cos(5 * t), np.sin(8 * t)])
@@ -52,7 +52,7 @@ def slow_factor(X, groups, coverage):
 
 
 def inside(new, X, groups, coverage):
-    """The share of new performances that lie within the simultaneous band as a whole."""
+    """The share of new trials that lie within the simultaneous band as a whole."""
     reach = simultaneous_factor(X, groups, coverage) * np.sqrt(predictive_variance(X, groups))
     return (np.abs(new - X.mean(axis=0)) <= reach).all(axis=(1, 2)).mean()
 
@@ -93,7 +93,7 @@ def test_within_variance_equals_slow_loop():
     np.testing.assert_allclose(within_variance(gappy, GROUPS), slow_within(gappy, GROUPS))
 
 
-def test_without_two_performances_of_anyone_the_variance_within_is_a_share():
+def test_without_two_trials_of_anyone_the_variance_within_is_a_share():
     X, groups = people([1] * 6)
     np.testing.assert_allclose(within_variance(X, groups), 0.32 * predictive_variance(X, groups))
     # The second feature is never seen twice in a group.
@@ -105,7 +105,7 @@ def test_without_two_performances_of_anyone_the_variance_within_is_a_share():
     np.testing.assert_allclose(within_variance(X, groups)[:, 0], expected)
 
 
-def test_within_variance_is_positive_where_performances_are_equal():
+def test_within_variance_is_positive_where_trials_are_equal():
     X, groups = people([2, 2])
     X[1], X[3] = X[0], X[2]
     assert (within_variance(X, groups) > 0).all()
@@ -119,7 +119,7 @@ def test_simultaneous_factor_equals_slow_loop(coverage):
         np.testing.assert_allclose(simultaneous_factor(X, groups, coverage), expected)
 
 
-def test_the_factor_of_two_performances():
+def test_the_factor_of_two_trials():
     """Of one there is no variance to judge the other by: the log's is taken to be large."""
     X, groups = people([1, 1])
     z = np.abs(X[0] - X[1]) / np.sqrt(slow_variance(X, groups))
@@ -175,7 +175,7 @@ def test_a_band_of_the_mean_repeats_with_its_random_state():
 # -- limits -----------------------------------------------------------------------------
 
 
-def test_variance_of_identical_performances_is_the_floor():
+def test_variance_of_identical_trials_is_the_floor():
     X = np.repeat(people([1])[0], 5, axis=0)
     v = predictive_variance(X, np.arange(5))
     np.testing.assert_allclose(v, np.broadcast_to(1e-9 * X[0].var(axis=0), v.shape))

@@ -14,14 +14,14 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     OnlineSynchronizer,
 )
-from sklearn_motionsync.datasets import load_performances, make_gait
+from sklearn_motionsync.datasets import load_trials, make_gait
 from sklearn_motionsync.online.stream import Course, go_round
 
 P, LENGTH = 50, 60
 NAMES = ("phase", "rate", "confidence", "lower", "upper", "cycle")
 
 
-def posture(phase, style=0.0):
+def pose(phase, style=0.0):
     """Three features of a cycle, at phases in cycles, of a person."""
     angle = 2 * np.pi * np.asarray(phase)[..., np.newaxis]
     waves = np.sin(angle), np.cos(angle + 0.3 * style), 0.6 * np.sin(2 * angle + 0.4 + style)
@@ -38,7 +38,7 @@ def paced(n_frames, begin=0.0, swing=0.3, pace=1.0):
 def fitted():
     rng = np.random.default_rng(0)
     styles, lengths = np.linspace(-0.3, 0.3, 7), (52, 64, 58, 61, 66, 60, 59)
-    X = [posture(np.linspace(0, 1, n), s) for n, s in zip(lengths, styles, strict=True)]
+    X = [pose(np.linspace(0, 1, n), s) for n, s in zip(lengths, styles, strict=True)]
     X = [x + 0.02 * rng.standard_normal(x.shape) for x in X]
     return OnlineSynchronizer(DenseSynchronizer(P), cyclic=True).fit(X)
 
@@ -53,7 +53,7 @@ def walk():
     """Frames of a minute of another person, and their phases."""
     truth = paced(1500, begin=0.37)
     noise = 0.02 * np.random.default_rng(1).standard_normal((1500, 3))
-    return posture(truth, 0.1) + noise, truth
+    return pose(truth, 0.1) + noise, truth
 
 
 def errors(found, truth):
@@ -84,7 +84,7 @@ def test_phase_goes_round_and_cycles_are_counted(fitted, walk):
 @pytest.mark.parametrize("begin", [0.0, 0.25, 0.6, 0.95])
 def test_it_begins_anywhere(fitted, begin):
     truth = paced(200, begin, 0.0)
-    (found,) = fitted.track([posture(truth)])
+    (found,) = fitted.track([pose(truth)])
     assert (found.phase[0], found.confidence[0], found.cycle[0]) == (0, 0, 0)
     assert found.upper[0] - found.lower[0] > 0.8 * P
     assert np.abs(errors(found, truth)[LENGTH // 5 :]).max() < 5
@@ -125,7 +125,7 @@ def test_streams_of_cycles_equal_streams_alone(fitted, live, walk):
 
 
 def test_cycles_go_on_while_nothing_is_seen(fitted, walk):
-    x, truth = posture(paced(600, 0.2, 0.0)), paced(600, 0.2, 0.0)
+    x, truth = pose(paced(600, 0.2, 0.0)), paced(600, 0.2, 0.0)
     gone = x.copy()
     gone[200:350] = np.nan
     (hidden,) = fitted.track([gone])
@@ -141,7 +141,7 @@ def test_cycles_go_on_while_nothing_is_seen(fitted, walk):
 def test_another_pace_is_followed(fitted):
     for pace in (0.6, 1.6):
         truth = paced(900, 0.1, 0.0, pace)
-        (found,) = fitted.track([posture(truth)])
+        (found,) = fitted.track([pose(truth)])
         # The delay of the filters is that of the mean pace.
         assert np.median(np.abs(errors(found, truth)[200:])) < 4
         assert np.median(found.rate[200:]) == pytest.approx(pace, rel=0.1)
@@ -175,7 +175,7 @@ def test_confidence_is_low_for_standing_still_and_other_movements(fitted, walk):
 def test_standing_still_within_a_walk_is_no_cycle(fitted):
     truth = paced(500, 0.3, 0.0)
     order = np.r_[:250, np.full(300, 250), 250:500]
-    (found,) = fitted.track([posture(truth)[order]])
+    (found,) = fitted.track([pose(truth)[order]])
     assert found.cycle[-1] == int(truth[-1])
     assert np.abs(errors(found, truth[order])[-150:]).max() < 5
     assert found.confidence[500] < 0.5 < found.confidence[-50:].min()
@@ -184,7 +184,7 @@ def test_standing_still_within_a_walk_is_no_cycle(fitted):
 def test_a_cycle_that_trembles_at_its_beginning_begins_once(fitted):
     t = np.arange(120)
     ahead = np.r_[np.linspace(0.3, 1.0, 45), 1 + 0.02 * np.sin(t / 4), np.linspace(1, 1.7, 45)]
-    (found,) = fitted.track([posture(ahead)])
+    (found,) = fitted.track([pose(ahead)])
     assert np.diff(found.cycle).tolist().count(1) == 1
     assert np.diff(found.cycle).min() == 0
 
@@ -206,7 +206,7 @@ def test_time_left_of_a_cycle_is_at_the_pace_of_the_last_one(fitted, live):
     truth = paced(600, 0.4, 0.0, 0.75)
     left = []
     assert live.time_left() == live.duration_
-    for frame in posture(truth):
+    for frame in pose(truth):
         now = live.step(frame)
         left.append(live.time_left())
     true = (np.ceil(truth) - truth) * LENGTH / 0.75
@@ -257,7 +257,7 @@ def test_angles_of_people_held_out():
 
 def test_walks_of_a_real_person(real_data):
     """Takes held out, against the moments at which the right ankle is farthest ahead."""
-    bunch = load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    bunch = load_trials(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
     held = (0, 3, 7, 11)
     known = [x for i, x in enumerate(bunch.data) if i not in held]
     cosines = DirectionCosines(bunch.skeleton)
@@ -288,17 +288,17 @@ def test_walks_of_a_real_person(real_data):
     assert max(late) <= 6
 
 
-@pytest.mark.parametrize("cost", ["velocity", "posture"])
+@pytest.mark.parametrize("cost", ["velocity", "pose"])
 def test_settings_single_precision_and_a_single_cycle(cost, walk):
     x, truth = walk
-    cycle = posture(np.linspace(0, 1, LENGTH + 1)).astype(np.float32)
+    cycle = pose(np.linspace(0, 1, LENGTH + 1)).astype(np.float32)
     live = OnlineSynchronizer(DenseSynchronizer(P, cost=cost), cyclic=True).fit([cycle])
     assert live.mean_.dtype == np.float32
     np.testing.assert_array_equal(live.mean_[0], live.mean_[-1])
     right, still = live.track([x, np.repeat(x[100:101], 300, axis=0)])
     assert np.median(np.abs(errors(right, truth)[LENGTH:])) < 4
     assert right.cycle[-1] == int(truth[-1])
-    assert still.confidence[-1] < 0.5 or cost == "posture"
+    assert still.confidence[-1] < 0.5 or cost == "pose"
 
 
 @pytest.mark.parametrize("n", [1, 3])
@@ -308,7 +308,7 @@ def test_constant_and_equal_cycles(n):
     assert np.isfinite(found).all()
     equal = OnlineSynchronizer(LinearSynchronizer(), cyclic=True)
     truth = np.arange(200) / 60
-    (found,) = equal.fit([posture(np.linspace(0, 1, 61))] * n).track([posture(truth)])
+    (found,) = equal.fit([pose(np.linspace(0, 1, 61))] * n).track([pose(truth)])
     assert np.median(np.abs((found.phase / 60 - truth + 0.5) % 1 - 0.5)) < 0.01
     assert found.cycle[-1] == 3
 
@@ -403,7 +403,7 @@ def test_attempts_of_streams_equal_those_alone(single):
 
 
 def test_second_attempts_of_real_people_held_out(real_data):
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     off, told, n = [], 0, 0
     for action in ("depositFloorR", "grabHighR"):
         features = make_pipeline(DirectionCosines(bunch.skeleton), ASpace())
@@ -422,6 +422,6 @@ def test_second_attempts_of_real_people_held_out(real_data):
             off.append(np.abs(two.phase[k:] - one.phase)[late:])
             told, n = told + two.cycle[-1], n + 1
             assert one.cycle[-1] == 0
-    # Some are told twice, as a jump of the posture is no movement.
+    # Some are told twice, as a jump of the pose is no movement.
     assert n <= told < 1.3 * n
     assert np.quantile(np.concatenate(off), 0.9) < 5

@@ -11,7 +11,7 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     OnlineSynchronizer,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.online.stream import Streams, gains_of, phase_bounds
 from sklearn_motionsync.online.synchronizer import Reference, calibrate
 from sklearn_motionsync.utils.parallel import Progress
@@ -110,7 +110,7 @@ def test_intervals_hold_the_made_truth_of_new_people(fitted, clips, truths, chan
 
 def test_intervals_hold_the_phases_of_real_people_held_out(real_data):
     """The truth is the warp of the whole clip. Under another action they are wide."""
-    clips = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    clips = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     action, other = "grabHighR", "depositFloorR"
     shares, right, wrong = [], [], []
     for actor in np.unique(clips.actor)[::2]:
@@ -161,7 +161,7 @@ def test_intervals_begin_narrow_at_the_first_frame(fitted, live, clips):
     for found in fitted.track(clips):
         assert found.lower[0] == 0
         assert found.upper[0] <= 2
-    # A performance that waits in the first posture stays there.
+    # A trial that waits in the first pose stays there.
     (waits,) = fitted.track([np.repeat(clips[0][:1], 100, axis=0)])
     assert waits.lower.max() < 2
     assert waits.lower[-20:].max() == 0
@@ -236,7 +236,7 @@ def test_bounds_of_streams_equal_their_definition(fitted, clips):
 
 
 def test_calibration_is_the_lowest_temperature_that_holds_nine_tenths():
-    """Of the phases of training performances, each matched to the mean of the others."""
+    """Of the phases of training trials, each matched to the mean of the others."""
     X = COSINES.transform([BUNCH.data[i] for i in KNOWN[:9]])
     live = OnlineSynchronizer(DenseSynchronizer(60, metric=None, refine=False)).fit(X)
     match, last = live.synchronizer_.match(X), 59
@@ -280,7 +280,7 @@ def test_intervals_do_not_depend_on_the_unit():
         np.testing.assert_allclose(other.upper, one.upper, atol=1)
 
 
-def test_a_single_training_performance_has_wider_intervals(fitted, clips, truths):
+def test_a_single_training_trial_has_wider_intervals(fitted, clips, truths):
     x = COSINES.transform([BUNCH.data[KNOWN[fitted.synchronizer_.pattern_index_]]])
     alone = OnlineSynchronizer(DenseSynchronizer(P)).fit(x).track(clips)
     assert mean_width(alone) > 1.5 * mean_width(fitted.track(clips))

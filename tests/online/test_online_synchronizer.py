@@ -1,4 +1,4 @@
-"""OnlineSynchronizer: phases of running performances against known warps and the offline path."""
+"""OnlineSynchronizer: phases of running trials against known warps and the offline path."""
 
 import copy
 import pickle
@@ -17,7 +17,7 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     OnlineSynchronizer,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.matching.matcher import Features
 from sklearn_motionsync.matching.units import Unit
 from sklearn_motionsync.online.causal import CausalDerivative
@@ -36,8 +36,8 @@ def movement(phase):
     )
 
 
-def performance(n_frames, bend=0.0, noise=0.0, seed=0):
-    """A performance and the phase of its frames, from 0 to 1."""
+def trial(n_frames, bend=0.0, noise=0.0, seed=0):
+    """A trial and the phase of its frames, from 0 to 1."""
     t = np.linspace(0, 1, n_frames)
     phase = t + bend * np.sin(2 * np.pi * t) / (2 * np.pi)
     rng = np.random.default_rng(seed)
@@ -47,7 +47,7 @@ def performance(n_frames, bend=0.0, noise=0.0, seed=0):
 @pytest.fixture(scope="module")
 def fitted():
     bends = np.linspace(-0.4, 0.4, 9)
-    X = [performance(50 + 5 * (i % 5), b, 0.02, i)[0] for i, b in enumerate(bends)]
+    X = [trial(50 + 5 * (i % 5), b, 0.02, i)[0] for i, b in enumerate(bends)]
     return OnlineSynchronizer(DenseSynchronizer(P)).fit(X)
 
 
@@ -70,7 +70,7 @@ def error(found, phase):
 
 @pytest.mark.parametrize(("n_frames", "bend"), [(60, 0.0), (45, 0.5), (100, -0.3)])
 def test_phase_and_rate_follow_known_warps(fitted, n_frames, bend):
-    x, phase = performance(n_frames, bend, 0.02, 77)
+    x, phase = trial(n_frames, bend, 0.02, 77)
     (found,) = fitted.track([x])
     errors = error(found, phase)
     # At another rate the delay of the filters differs: twice 1.8 frames times the difference.
@@ -86,7 +86,7 @@ def test_phase_and_rate_follow_known_warps(fitted, n_frames, bend):
 
 
 def test_phase_of_new_person_is_near_offline_path(real_data):
-    clips, n_frames = load_performances(real_data / "hdm05" / "hdm05_positions.npz"), 100
+    clips, n_frames = load_trials(real_data / "hdm05" / "hdm05_positions.npz"), 100
     action, other = "grabHighR", "depositFloorR"
 
     def load(action, held_out):
@@ -114,7 +114,7 @@ def test_phase_of_new_person_is_near_offline_path(real_data):
 
 
 def test_track_equals_step_and_does_not_look_ahead(fitted, live):
-    x, _ = performance(70, 0.4, 0.05, 5)
+    x, _ = trial(70, 0.4, 0.05, 5)
     x[0, 1] = x[7:9, 2] = np.nan
     whole, part = fitted.track([x, x[:40]])
     steps = step_all(live, x)
@@ -127,7 +127,7 @@ def test_track_equals_step_and_does_not_look_ahead(fitted, live):
 
 
 def test_costs_at_the_end_equal_offline_trellis_to_the_last_bit():
-    mean, x = movement(np.linspace(0, 1, P)), performance(75, 0.4, 0.05)[0]
+    mean, x = movement(np.linspace(0, 1, P)), trial(75, 0.4, 0.05)[0]
     unit = Unit.of(mean[np.newaxis])
     reference = Reference(Features("velocity", 0.03, unit), mean, P - 1)
     streams = Streams(reference, 1, 3)
@@ -142,10 +142,10 @@ def test_costs_at_the_end_equal_offline_trellis_to_the_last_bit():
 
 @pytest.mark.parametrize("every", [1, 2, 4])
 def test_times_give_the_same_phases_at_any_frame_rate(fitted, live, every):
-    _, phase = performance(241, 0.4)
+    _, phase = trial(241, 0.4)
     rng = np.random.default_rng(1)
     kept = np.arange(0, 241, every)
-    # From 0 to 60 frames of the training performances, not evenly.
+    # From 0 to 60 frames of the training trials, not evenly.
     times = kept / 4 + np.where(kept % 240 == 0, 0, rng.uniform(-0.05, 0.05, len(kept)))
     truth = np.interp(times * 4, np.arange(241), phase)
     (found,) = fitted.track([movement(truth)], [times])
@@ -199,7 +199,7 @@ def test_phase_goes_on_at_mean_pace_without_observations(fitted):
 
 
 def test_time_without_frames_equals_frames_of_nan(fitted, live):
-    x, _ = performance(60, 0.0, 0.02, 3)
+    x, _ = trial(60, 0.0, 0.02, 3)
     gap = x.copy()
     gap[20:45] = np.nan
     kept = np.r_[:20, 45:60]
@@ -211,7 +211,7 @@ def test_time_without_frames_equals_frames_of_nan(fitted, live):
 
 
 def test_phase_stays_at_beginning_and_end_during_rests(fitted):
-    x, phase = performance(60, 0.2, 0.0)
+    x, phase = trial(60, 0.2, 0.0)
     rests = [np.repeat(x[:1], 40, axis=0), x, np.repeat(x[-1:], 40, axis=0)]
     (found,) = fitted.track([np.concatenate(rests)])
     assert found.phase[:40].max() < 2
@@ -225,7 +225,7 @@ def test_time_left_is_weighted_mean_of_duration_and_phase(live):
     live.set_params(frame_rate=10)
     mean = live.duration_ / 10
     assert live.time_left() == pytest.approx(mean)
-    for k, frame in enumerate(performance(60)[0]):
+    for k, frame in enumerate(trial(60)[0]):
         share = live.step(frame, 100 + k / 10).phase / (P - 1)
         expected = (1 - share) * (max(mean - k / 10, 0) + mean * share)
         assert live.time_left() == pytest.approx(expected)
@@ -238,9 +238,9 @@ def test_constant_features_say_nothing_of_the_phase(sync):
     def beside(x, value):
         return np.column_stack([x, np.full(len(x), value)])
 
-    X = [beside(performance(50 + i, 0.1 * (i - 3), 0.02, i)[0], 5.0) for i in range(7)]
+    X = [beside(trial(50 + i, 0.1 * (i - 3), 0.02, i)[0], 5.0) for i in range(7)]
     live = OnlineSynchronizer(sync).fit(X)
-    x, nothing = performance(60, 0.2, 0.02, 9)[0], np.full((60, 3), np.nan)
+    x, nothing = trial(60, 0.2, 0.02, 9)[0], np.full((60, 3), np.nan)
     seen, hidden, alone, blind = live.track(
         [beside(x, 5.0), beside(x, np.nan), beside(nothing, 5.0), beside(nothing, np.nan)]
     )
@@ -251,13 +251,13 @@ def test_constant_features_say_nothing_of_the_phase(sync):
 
 def test_estimates_of_streams_equal_their_definitions():
     """Rate, confidence and mean cost of two streams, one of which is hidden at times."""
-    X = [performance(50 + i, 0.1 * (i - 3), 0.02, i)[0] for i in range(7)]
+    X = [trial(50 + i, 0.1 * (i - 3), 0.02, i)[0] for i in range(7)]
     live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X)
     reference = Reference(live.synchronizer_.features_, live.mean_, live.duration_, 8.0, 1.5)
-    # The last posture is held until the filters, 1.77 frames wide, have forgotten the movement.
+    # The last pose is held until the filters, 1.77 frames wide, have forgotten the movement.
     assert len(reference.moving) == 2 * (P - 1) + 1 + 2 * 11
     streams = Streams(reference, 2, 3)
-    x, y = performance(75, 0.3, 0.1, 8)[0], performance(75, 0.0, 0.02, 9)[0]
+    x, y = trial(75, 0.3, 0.1, 8)[0], trial(75, 0.0, 0.02, 9)[0]
     y[20:23] = y[40, :2] = np.nan
     phases, costs, shares = [], [], []
     for sample in np.stack([x, y], axis=1):
@@ -293,7 +293,7 @@ def test_estimates_of_streams_equal_their_definitions():
 
 
 def test_streams_side_by_side_equal_streams_alone(fitted, live):
-    x, y = performance(60, 0.4, 0.02, 1)[0], performance(60, -0.4, 0.02, 2)[0]
+    x, y = trial(60, 0.4, 0.02, 1)[0], trial(60, -0.4, 0.02, 2)[0]
     x[10, 2] = np.nan
     both, alone = step_all(live, np.stack([x, y], axis=1)), fitted.track([x, y])
     for i, one in enumerate(alone):
@@ -307,7 +307,7 @@ def test_streams_side_by_side_equal_streams_alone(fitted, live):
 
 
 def test_reset_of_one_stream_does_not_interpolate_from_its_last_frame(fitted, live):
-    x, _ = performance(60, 0.0, 0.02, 6)
+    x, _ = trial(60, 0.0, 0.02, 6)
     times, first, second = 1.7 * np.arange(20), x[::3], x[1::3]
     step_all(live, np.stack([first, first], axis=1), times)
     live.reset(1)
@@ -318,7 +318,7 @@ def test_reset_of_one_stream_does_not_interpolate_from_its_last_frame(fitted, li
 
 
 def test_time_left_begins_again_for_a_reset_stream(live):
-    x, _ = performance(60)
+    x, _ = trial(60)
     step_all(live, [x[[0, 0]], x[[9, 9]]], [0, 9])
     live.reset(0)
     assert live.time_left()[0] == pytest.approx(live.duration_)
@@ -334,7 +334,7 @@ def test_time_left_begins_again_for_a_reset_stream(live):
 
 
 def test_copies_continue_independently(live):
-    x, _ = performance(60, 0.4, 0.02, 8)
+    x, _ = trial(60, 0.4, 0.02, 8)
     expected = step_all(live, x)
     live.reset()
     assert len(live.history.phase) == 0
@@ -346,7 +346,7 @@ def test_copies_continue_independently(live):
 
 
 def test_frames_and_results_may_be_overwritten(fitted, live):
-    x, _ = performance(50, 0.3)
+    x, _ = trial(50, 0.3)
     expected, buffer = step_all(copy.deepcopy(fitted), np.stack([x, x], axis=1)), np.empty((2, 3))
     for frame, right in zip(x, expected, strict=True):
         buffer[:] = frame
@@ -371,11 +371,11 @@ def test_rows_and_linear_synchronizer():
     assert np.median(np.abs(found.phase - np.arange(50))) < 5
 
 
-def test_single_precision_and_single_training_performance():
-    X = [performance(50, b)[0].astype(np.float32) for b in (0.0, 0.3)]
+def test_single_precision_and_single_training_trial():
+    X = [trial(50, b)[0].astype(np.float32) for b in (0.0, 0.3)]
     live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X[:1])
     (found,) = live.track(X[1:])
-    assert np.median(error(found, performance(50, 0.3)[1])) < 1.5
+    assert np.median(error(found, trial(50, 0.3)[1])) < 1.5
     assert found.confidence.mean() > 0.5
     # Frames of single precision are interpolated in double precision.
     times = 0.7 * np.arange(len(X[1]))
@@ -383,8 +383,8 @@ def test_single_precision_and_single_training_performance():
     assert step_all(live, X[1], times) == step_all(again, X[1].astype(np.float64), times)
 
 
-def test_constant_and_equal_training_performances():
-    x, _ = performance(40)
+def test_constant_and_equal_training_trials():
+    x, _ = trial(40)
     constant = OnlineSynchronizer(LinearSynchronizer()).fit([np.ones((40, 3))] * 2)
     for y in (x, np.ones((40, 3))):
         assert np.isfinite(constant.track([y])[0]).all()
@@ -392,7 +392,7 @@ def test_constant_and_equal_training_performances():
     np.testing.assert_array_equal(found.phase, np.arange(40))
     assert found.confidence.min() > 0.9
     # Another movement is as unlike them in any unit.
-    other = performance(40, 0.4)[0][::-1]
+    other = trial(40, 0.4)[0][::-1]
     many, few = (
         OnlineSynchronizer(LinearSynchronizer()).fit([x * unit] * 3).track([other * unit])[0]
         for unit in (1, 2.0**-20)
@@ -404,10 +404,10 @@ def test_constant_and_equal_training_performances():
 def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
     """By frames of streams: the likeliest temperature, and the median of the largest mean costs.
 
-    Of 30 performances 24 are matched; of a long one every second moment counts.
+    Of 30 trials 24 are matched; of a long one every second moment counts.
     """
-    X = [performance(45 + i % 7, 0.03 * (i % 9 - 4), 0.02, i)[0] for i in range(30)]
-    X[0] = performance(160, -0.2, 0.02)[0]
+    X = [trial(45 + i % 7, 0.03 * (i % 9 - 4), 0.02, i)[0] for i in range(30)]
+    X[0] = trial(160, -0.2, 0.02)[0]
     live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X)
     match = live.synchronizer_.match(X)
     warped, last = match.warp(X), P - 1
@@ -445,7 +445,7 @@ def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
 
 
 def test_refused_frame_changes_nothing(fitted, live):
-    x, _ = performance(20)
+    x, _ = trial(20)
     expected = step_all(copy.deepcopy(fitted), x)
     assert live.step(x[0]) == expected[0]
     for k, frame in enumerate(x[1:], 1):
@@ -474,17 +474,17 @@ def test_methods_before_fit_are_refused():
 
 
 def test_unknown_streams_and_wrong_times_are_refused(fitted, live):
-    with pytest.raises(ValueError, match="not among 0 running performances"):
+    with pytest.raises(ValueError, match="not among 0 running trials"):
         live.reset(0)
     live.step(np.zeros((2, 3)))
     live.reset([])
     for stream in (2, -3, "a", 0.5, [[0, 1]]):
-        with pytest.raises(ValueError, match="not among 2 running performances"):
+        with pytest.raises(ValueError, match="not among 2 running trials"):
             live.reset(stream)
     with pytest.raises(ValueError, match=r"one sequence of times .*, got 2 for 1"):
-        fitted.track([performance(9)[0]], [None, None])
-    with pytest.raises(ValueError, match="Performance 1: times must be one a frame"):
-        fitted.track([performance(9)[0]] * 2, [range(9), range(8)])
+        fitted.track([trial(9)[0]], [None, None])
+    with pytest.raises(ValueError, match="Trial 1: times must be one a frame"):
+        fitted.track([trial(9)[0]] * 2, [range(9), range(8)])
 
 
 def test_time_stamps_that_come_twice_are_refused():
@@ -503,17 +503,17 @@ def test_time_stamps_that_come_twice_are_refused():
 
 def test_phases_do_not_depend_on_the_origin_of_time():
     """1e17 is a time in nanoseconds, where the next number is 16 later."""
-    x, _ = performance(60, 0.3, 0.02, 4)
+    x, _ = trial(60, 0.3, 0.02, 4)
     times = np.arange(0, 960, 16.0)
     slow = OnlineSynchronizer(LinearSynchronizer()).fit(
-        [np.repeat(performance(50, b, 0.02, i)[0], 16, axis=0) for i, b in enumerate((-0.2, 0.2))]
+        [np.repeat(trial(50, b, 0.02, i)[0], 16, axis=0) for i, b in enumerate((-0.2, 0.2))]
     )
     (expected,), (found,) = slow.track([x], [times]), slow.track([x], [times + 1e17])
     np.testing.assert_array_equal(found.phase, expected.phase)
 
 
 def test_feature_names_of_frames_are_checked():
-    X = [pd.DataFrame(performance(30, bend)[0], columns=list("abc")) for bend in (0.0, 0.3)]
+    X = [pd.DataFrame(trial(30, bend)[0], columns=list("abc")) for bend in (0.0, 0.3)]
     live = OnlineSynchronizer(DenseSynchronizer(30)).fit(X)
     expected = live.step(X[0].iloc[0])
     live.reset()
@@ -523,7 +523,7 @@ def test_feature_names_of_frames_are_checked():
             live.step(row)
 
 
-def test_check_times_returns_frames_of_the_training_performances():
+def test_check_times_returns_frames_of_the_training_trials():
     assert check_times(None, 3).tolist() == [0, 1, 2]
     assert check_times(None, 2, after=4.5).tolist() == [5.5, 6.5]
     assert check_times([0.5, 1], 2, frame_rate=30).tolist() == [15, 30]
@@ -549,13 +549,13 @@ def test_check_times_refuses(times, after, message):
 
 def test_times_of_another_unit_are_warned_of():
     """Milliseconds where seconds are meant, and seconds where frames are."""
-    X = [performance(30)[0] for _ in range(3)]
+    X = [trial(30)[0] for _ in range(3)]
     live = OnlineSynchronizer(LinearSynchronizer(), frame_rate=50).fit(X)
     seconds = np.arange(30) / 50
-    with pytest.warns(UserWarning, match="Performance 0: times are in seconds, and 20 of them"):
+    with pytest.warns(UserWarning, match="Trial 0: times are in seconds, and 20 of them"):
         live.track(X[:1], [1000 * seconds])
     live.track(X[:1], [seconds / 10])
     live.track(X[:1], [10 * seconds])
     in_frames = OnlineSynchronizer(LinearSynchronizer()).fit(X)
-    with pytest.warns(UserWarning, match="are in frames of the training performances, and 0.02 of"):
+    with pytest.warns(UserWarning, match="are in frames of the training trials, and 0.02 of"):
         in_frames.track(X[:1], [seconds])

@@ -107,7 +107,7 @@ PROJECTION = np.array([[1.0, 0.2, 0.0], [0.0, -1.0, 0.5]]), np.array([0.3, -1.0]
 
 @pytest.mark.parametrize("projection", [None, PROJECTION])
 @pytest.mark.parametrize("method", ["track", "smooth"])
-def test_postures_equal_gaussian_process_posterior(fitted, seen, method, projection):
+def test_poses_equal_gaussian_process_posterior(fitted, seen, method, projection):
     values, times = seen
     matrix, offset = (np.eye(3), np.zeros(3)) if projection is None else projection
     values = with_gaps(values @ matrix.T + offset)
@@ -118,7 +118,7 @@ def test_postures_equal_gaussian_process_posterior(fitted, seen, method, project
         upto = i if method == "track" else len(times) - 1
         given = fitted, track.phases, values, times, matrix, offset
         mean, covariance = posterior(*given, i, upto)
-        np.testing.assert_allclose(track.postures[i], mean, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.poses[i], mean, rtol=0, atol=1e-9)
         np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
 
 
@@ -147,7 +147,7 @@ def test_pooled_member_equals_gaussian_process_posterior(
     for i in range(len(times)):
         upto = i if method == "track" else len(times) - 1
         mean, covariance = posterior(level, 0 * times, values, times, matrix, offset, i, upto)
-        np.testing.assert_allclose(track.postures[i], mean, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.poses[i], mean, rtol=0, atol=1e-9)
         np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
 
 
@@ -188,10 +188,10 @@ def test_track_and_smooth_equal_kalman_filter_and_rts_at_known_phase(fitted, see
         clock = np.arange(tracker.n_frames_)
         mean = np.column_stack([np.interp(phases, clock, m) for m in tracker.mean_.T])
         known = kalman_filter_and_rts(tracker, mean, given, times)
-        for method, (postures, covariances) in zip(("track", "smooth"), known, strict=True):
+        for method, (poses, covariances) in zip(("track", "smooth"), known, strict=True):
             track = getattr(tracker, method)(given, times=times)
             assert not track.lost.any()
-            np.testing.assert_allclose(track.postures, postures, rtol=0, atol=1e-9)
+            np.testing.assert_allclose(track.poses, poses, rtol=0, atol=1e-9)
             np.testing.assert_allclose(track.covariances, covariances, rtol=0, atol=1e-9)
 
 
@@ -212,10 +212,10 @@ def test_restarts_leave_the_body_where_it_is():
     values = mean + 0.1 * rng.standard_normal(mean.shape)
     values[rng.random(mean.shape) < 0.3] = np.nan
     known = kalman_filter_and_rts(fitted, mean, values, times)
-    for method, (postures, covariances) in zip(("track", "smooth"), known, strict=True):
+    for method, (poses, covariances) in zip(("track", "smooth"), known, strict=True):
         track = getattr(fitted, method)(values, times=times)
         np.testing.assert_array_equal(track.phases, phases)
-        np.testing.assert_allclose(track.postures, postures, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.poses, poses, rtol=0, atol=1e-9)
         np.testing.assert_allclose(track.covariances, covariances, rtol=0, atol=1e-9)
 
 
@@ -223,13 +223,13 @@ def test_smooth_of_several_blocks_equals_posterior(fitted):
     rng = np.random.default_rng(5)
     times = np.cumsum(rng.uniform(0.03, 0.07, 230))
     blind = fitted.track(np.full((230, 3), np.nan), times=times)
-    values = with_gaps(blind.postures + 0.1 * rng.standard_normal((230, 3)))
+    values = with_gaps(blind.poses + 0.1 * rng.standard_normal((230, 3)))
     values[95:105] = np.nan
     track = fitted.smooth(values, times=times)
     given = fitted, track.phases, values, times, np.eye(3), np.zeros(3)
     for i in (0, 99, 100, 199, 229):
         mean, covariance = posterior(*given, i, 229)
-        np.testing.assert_allclose(track.postures[i], mean, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.poses[i], mean, rtol=0, atol=1e-9)
         np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
 
 
@@ -242,7 +242,7 @@ def test_squared_distances_in_covariances_are_chi_square(fitted):
         values[4:9, 1:] = np.nan
         for track in (fitted.track(values), fitted.smooth(values)):
             if not track.lost.any():
-                off = body[6] - track.postures[6]
+                off = body[6] - track.poses[6]
                 distances.append(off @ np.linalg.solve(track.covariances[6], off))
     assert len(distances) > 30
     assert 2.4 < np.mean(distances) < 3.6
@@ -258,9 +258,9 @@ def test_first_frame_unseen_is_the_mixture_of_first_phases(method):
     last, mean = tracker.n_frames_ - 1, tracker.mean_
     track = getattr(tracker, method)(np.full((1, 3), np.nan))
     phases = np.append(np.zeros(18), [9 / 19 * last, last])
-    postures = np.column_stack([np.interp(phases, np.arange(last + 1), m) for m in mean.T])
-    np.testing.assert_allclose(track.postures[0], postures.mean(axis=0), atol=1e-12)
-    between = np.cov(postures.T, bias=True)
+    poses = np.column_stack([np.interp(phases, np.arange(last + 1), m) for m in mean.T])
+    np.testing.assert_allclose(track.poses[0], poses.mean(axis=0), atol=1e-12)
+    between = np.cov(poses.T, bias=True)
     np.testing.assert_allclose(track.covariances[0], tracker.covariance_ + between, atol=1e-12)
     assert (track.phases[0], track.effective_sizes[0]) == (0, pytest.approx(20))
 
@@ -297,8 +297,8 @@ def test_limits_of_the_nis_equal_their_definition(outlier, duration):
         return most
 
     velocity = max(4 * (largest(slopes, noises) - 1), 8 * np.sqrt(2 / (3 * width)))
-    posture = max(2 * (largest(deviations, [noise**2] * 25) - 1), 8.0)
-    np.testing.assert_allclose(model.nis_limits, [1 + velocity, 1 + posture], rtol=1e-9)
+    pose = max(2 * (largest(deviations, [noise**2] * 25) - 1), 8.0)
+    np.testing.assert_allclose(model.nis_limits, [1 + velocity, 1 + pose], rtol=1e-9)
     np.testing.assert_allclose(model.velocities, shrunk(slopes), rtol=1e-9)
     innovations, process = [], model.process
     for x in deviations:
@@ -313,7 +313,7 @@ def test_limits_of_the_nis_equal_their_definition(outlier, duration):
             means = means + (gain @ off).reshape(2, 1, width)
             covariance = covariance - gain @ S @ gain.T
     assert model.gate == pytest.approx(max(100, 10 * max(innovations)), rel=1e-6)
-    assert (model.gate > 100) == (posture > 8) == outlier
+    assert (model.gate > 100) == (pose > 8) == outlier
 
 
 def test_estimates_are_those_of_the_weighted_particles():
@@ -330,10 +330,10 @@ def test_estimates_are_those_of_the_weighted_particles():
         particles, deviations = running.phases.particles, running.phases.deviations
         weights = np.exp(particles.log_weights)
         assert weights.sum() == pytest.approx(1)
-        postures = np.column_stack([np.interp(particles.phases, np.arange(25), m) for m in mean.T])
-        postures += deviations.means[0]
-        np.testing.assert_allclose(track.postures, weights @ postures)
-        between = np.cov(postures.T, aweights=weights, ddof=0)
+        poses = np.column_stack([np.interp(particles.phases, np.arange(25), m) for m in mean.T])
+        poses += deviations.means[0]
+        np.testing.assert_allclose(track.poses, weights @ poses)
+        between = np.cov(poses.T, aweights=weights, ddof=0)
         np.testing.assert_allclose(track.covariances, deviations.covariance[:3, :3] + between)
         assert track.effective_sizes == pytest.approx(1 / np.square(weights).sum())
         paces = np.where(particles.phases < 24, np.exp(particles.log_rates), 0)
@@ -410,7 +410,7 @@ def test_weights_and_nis_equal_their_definitions(rows):
             weights = old * np.exp(-0.5 * 100 * min(dt, 1.44) / 48 / 2 * distances)
             np.testing.assert_allclose(now.weights, weights / weights.sum(), rtol=1e-6)
         expected = np.column_stack([np.interp(now.phases, frames, m) for m in model.mean.T])
-        # Postures are judged before the weights change.
+        # Poses are judged before the weights change.
         off = y - matrix @ (old @ expected if p else expected.mean(axis=0))
         spread = matrix @ model.process.covariance @ matrix.T + noise
         new = np.array([now.weights @ distances if p else n, off @ np.linalg.solve(spread, off)])

@@ -15,7 +15,7 @@ from sklearn_motionsync import (
     MotionTracker,
     Track,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 
 LIMBS = np.arange(1, 37).reshape(12, 3)
 
@@ -117,24 +117,24 @@ def test_rows_are_takes_after_a_fit_on_rows(tracker):
     rows = np.stack([movement(size)[:, 0] for size in (0.9, 1.0, 1.1, 1.2)])
     fitted = clone(tracker).fit(rows)
     tracks = fitted.track(rows[:2])
-    assert [t.postures.shape for t in tracks] == [(60, 1)] * 2
+    assert [t.poses.shape for t in tracks] == [(60, 1)] * 2
     assert_same(fitted.step(rows[0, 0]), (part[0] for part in tracks[0]))
 
 
 def test_single_precision_stays(tracker, take):
     single = clone(tracker).fit([movement(s).astype(np.float32) for s in (0.9, 1.0, 1.1)])
     track = single.track(take.astype(np.float32))
-    assert track.postures.dtype == track.covariances.dtype == single.mean_.dtype == np.float32
+    assert track.poses.dtype == track.covariances.dtype == single.mean_.dtype == np.float32
 
 
 def test_single_frame(tracker):
     frame = movement(1.05)[:1]
     for track in (tracker.track(frame), tracker.smooth(frame)):
-        assert np.linalg.norm(track.postures - frame) < 0.05
+        assert np.linalg.norm(track.poses - frame) < 0.05
         assert track.rates.shape == track.lost.shape == (1,)
 
 
-def test_projection_of_postures(tracker, running):
+def test_projection_of_poses(tracker, running):
     """A plane seen through an offset, with gaps; and the identity."""
     matrix, offset = np.array([[1.0, 0.5, 0.0], [0.0, 1.0, -1.0]]), np.array([3.0, -2.0])
     clean = movement(1.05)
@@ -143,13 +143,13 @@ def test_projection_of_postures(tracker, running):
     for method in (tracker.track, tracker.smooth):
         track = method(image, projection=(matrix, offset))
         assert np.abs(track.phases - np.arange(60))[5:].max() < 5
-        assert np.abs(track.postures - clean)[5:].mean() < 0.1
+        assert np.abs(track.poses - clean)[5:].mean() < 0.1
     for identity in (np.eye(3), (np.eye(3),), (np.eye(3), np.zeros(3))):
         assert_same(tracker.track(clean, projection=identity), tracker.track(clean))
     for frame in image[:5]:
         running.step(frame, projection=(matrix, offset))
     # The projection may change from step to step.
-    assert np.isfinite(running.step(clean[5]).postures).all()
+    assert np.isfinite(running.step(clean[5]).poses).all()
 
 
 # -- what is learnt -----------------------------------------------------------------------
@@ -163,7 +163,7 @@ def test_rate_follows_a_faster_movement(tracker):
 
 
 def test_learnt_times_do_not_depend_on_the_frames_of_the_clock():
-    """In frames of the training performances, whatever P is."""
+    """In frames of the training trials, whatever P is."""
     rng, t = np.random.default_rng(0), np.linspace(0, 1, 60)
     X = [
         movement(1, 60)
@@ -200,21 +200,21 @@ def test_constant_features_have_the_least_variance():
     expected = without.fit(TRAINING).track(take)
     for value in (5.0, np.nan):
         track = fitted.track(np.column_stack([take, np.full(60, value)]))
-        np.testing.assert_allclose(track.postures[:, 3], 5, atol=1e-3)
+        np.testing.assert_allclose(track.poses[:, 3], 5, atol=1e-3)
         assert np.abs(track.phases - expected.phases)[5:].max() < 3
         assert not track.lost.any()
 
 
-def test_two_performances_are_enough():
+def test_two_trials_are_enough():
     """Of two the deviations are their differences."""
     X = [movement(1.0), movement(1.2)]
     fitted = MotionTracker(LinearSynchronizer(), 50).fit(X)
     squares = np.square(X[1] - X[0]).mean(axis=0)
     np.testing.assert_allclose(np.diag(fitted.covariance_), squares)
-    assert np.isfinite(fitted.track(movement(1.05)).postures).all()
+    assert np.isfinite(fitted.track(movement(1.05)).poses).all()
 
 
-def test_groups_of_similar_performances_widen_deviations(tracker):
+def test_groups_of_similar_trials_widen_deviations(tracker):
     training = [movement(size) for size in (0.8, 0.81, 1.2, 1.21)]
     alone = clone(tracker).fit(training)
     people = clone(tracker).fit(training, groups=["ann", "ann", "bob", "bob"])
@@ -226,7 +226,7 @@ def test_groups_of_similar_performances_widen_deviations(tracker):
 
 def test_without_observations_the_movement_goes_on(tracker):
     blind = tracker.track(np.full((60, 3), np.nan))
-    assert np.isfinite(blind.postures).all()
+    assert np.isfinite(blind.poses).all()
     assert not blind.lost.any()
     assert (np.diff(blind.phases[:40]) > 0).all()
     widths = np.trace(blind.covariances, axis1=1, axis2=2)
@@ -269,12 +269,12 @@ def test_observations_outside_the_gate_are_ignored_then_lost(tracker, size):
     clean = movement(1.05)
     odd, without = clean.copy(), clean.copy()
     odd[20], without[20] = [size, -size, size], np.nan
-    np.testing.assert_array_equal(tracker.track(odd).postures, tracker.track(without).postures)
+    np.testing.assert_array_equal(tracker.track(odd).poses, tracker.track(without).poses)
     odd[20:] = size
     for track in (tracker.track(odd), tracker.smooth(odd)):
         assert track.lost[40:].all()
         assert not track.lost[:20].any()
-        assert np.isfinite(track.postures).all()
+        assert np.isfinite(track.poses).all()
         assert np.isfinite(track.covariances).all()
 
 
@@ -287,14 +287,14 @@ def test_other_movements_are_lost_and_the_action_is_found_again(tracker):
 
 
 @pytest.mark.parametrize(("deviation", "lost"), [(1.5, False), (4.0, True)])
-def test_postures_far_from_the_mean_are_lost(tracker, deviation, lost):
+def test_poses_far_from_the_mean_are_lost(tracker, deviation, lost):
     noise = np.sqrt(np.diag(tracker.covariance_) + tracker.noise**2)
     track = tracker.track(movement(1.05) + deviation * noise * [1, -1, 1])
     assert track.lost[20:].any() == lost
     assert tracker.departure_limit_ == 9
 
 
-def test_unusual_postures_are_found_again(tracker):
+def test_unusual_poses_are_found_again(tracker):
     """Two and a half standard deviations off, after 20 frames of something else."""
     noise = np.sqrt(np.diag(tracker.covariance_) + tracker.noise**2)
     other = np.cumsum(np.random.default_rng(0).standard_normal((20, 3)) / 4, axis=0)
@@ -304,7 +304,7 @@ def test_unusual_postures_are_found_again(tracker):
 
 
 @pytest.mark.parametrize("pause", [0, 30])
-def test_second_performance_restarts_after_a_pause(tracker, pause):
+def test_second_trial_restarts_after_a_pause(tracker, pause):
     one = movement(1.05)
     track = tracker.track(np.concatenate([one, np.repeat(one[-1:], pause, axis=0), one]))
     phases = track.phases
@@ -323,7 +323,7 @@ INFINITE = np.where(np.arange(180).reshape(60, 3) == 11, np.inf, movement(1))
     ("X", "more", "message"),
     [
         (movement(1)[:, :2], {}, r"The take has shape \(60, 2\), expected \(n, 3\)"),
-        ([movement(1), movement(1)[:, :2]], {}, r"Performance 1 has shape \(60, 2\)"),
+        ([movement(1), movement(1)[:, :2]], {}, r"Trial 1 has shape \(60, 2\)"),
         (INFINITE, {}, r"The take, frame 3, feature 2 is infinity"),
         (movement(1)[:0], {}, r"with n at least 1"),
         (movement(1)[0], {}, r"x\[:, np.newaxis\]"),
@@ -332,12 +332,12 @@ INFINITE = np.where(np.arange(180).reshape(60, 3) == 11, np.inf, movement(1))
         (
             [movement(1)],
             {"times": [None, None]},
-            r"one sequence .* for each performance, got 2 for 1",
+            r"one sequence .* for each trial, got 2 for 1",
         ),
         (
             [movement(1)],
             {"times": 3.0},
-            r"one sequence .* for each performance, got none for 1",
+            r"one sequence .* for each trial, got none for 1",
         ),
         (movement(1), {"projection": (np.eye(3),) * 3}, r"or the pair \(matrix, offset\)"),
         (movement(1), {"projection": np.eye(2)}, r"matrix \(n_observed, 3\)"),
@@ -413,10 +413,10 @@ def test_errors_of_a_new_person_are_smaller_than_of_the_mean(bends):
         track, smooth = tracker.track(seen), tracker.smooth(seen)
         matched = tracker.synchronizer_.match([X[i]]).frames([len(X[i])])[0]
         truth = np.interp(np.arange(len(X[i])), matched, np.arange(len(matched)))
-        # The mean performance at the phase of the whole take.
+        # The mean trial at the phase of the whole take.
         frames = np.arange(tracker.n_frames_)
         mean = np.column_stack([np.interp(truth, frames, m) for m in tracker.mean_.T])
-        estimates = track.postures, smooth.postures, mean
+        estimates = track.poses, smooth.poses, mean
         squares.append([np.square(x - X[i])[hidden].sum() for x in estimates])
         phases.append(100 / tracker.n_frames_ * np.abs(track.phases - truth)[len(truth) // 5 :])
         assert track.lost.mean() < 0.05
@@ -432,15 +432,15 @@ def test_moved_joints_of_a_new_person(bends):
     held = bends.actor == bends.actor[-1]
     training = [x for x, of in zip(X, held, strict=True) if not of]
     cosines = DirectionCosines(bends.skeleton).fit(training)
-    postures, sync = cosines.transform(training), DenseSynchronizer(metric=None, refine=False)
+    poses, sync = cosines.transform(training), DenseSynchronizer(metric=None, refine=False)
     rng, new = np.random.default_rng(0), [X[i] for i in np.flatnonzero(held)[:2]]
     for sd in (0.01, 0.05):
         errors = []
         seen = cosines.transform([x + sd * rng.standard_normal(x.shape) for x in new])
         for noise in (JointNoise(sd, cosines), 0.05):
             tracker = MotionTracker(sync, 100, noise=noise)
-            tracks = tracker.fit(postures, groups=bends.actor[~held]).track(seen)
-            off = [t.postures - x for t, x in zip(tracks, cosines.transform(new), strict=True)]
+            tracks = tracker.fit(poses, groups=bends.actor[~held]).track(seen)
+            off = [t.poses - x for t, x in zip(tracks, cosines.transform(new), strict=True)]
             errors.append(np.sqrt(np.mean(np.square(np.concatenate(off)))))
             if noise != 0.05:
                 assert np.mean([t.lost.mean() for t in tracks]) <= 0.02
@@ -449,7 +449,7 @@ def test_moved_joints_of_a_new_person(bends):
 
 def test_bands_of_another_action_are_wider_and_hold_as_often(real_data, bends):
     """Of hidden arms, as evidence makes them wider; people held out, and jogs under bends."""
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     jogs = np.flatnonzero(bunch.target == "jogLeftCircle4StepsRstart")[:2]
     cosines = DirectionCosines(bunch.skeleton)
     held = bends.actor == bends.actor[-1]
@@ -468,7 +468,7 @@ def test_bands_of_another_action_are_wider_and_hold_as_often(real_data, bends):
         std = [np.sqrt(np.diagonal(t.covariances, axis1=1, axis2=2)) for t in tracks]
         hidden = LIMBS[8:10].ravel()
         near = [
-            (np.abs(t.postures - x) <= 1.645 * s)[:, hidden]
+            (np.abs(t.poses - x) <= 1.645 * s)[:, hidden]
             for t, x, s in zip(tracks, takes, std, strict=True)
         ]
         inside.append(np.concatenate(near).mean())
@@ -478,7 +478,7 @@ def test_bands_of_another_action_are_wider_and_hold_as_often(real_data, bends):
 
 
 def test_jogging_is_lost_under_a_model_of_bends(real_data, bends):
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     jog = bunch.data[np.flatnonzero(bunch.target == "jogLeftCircle4StepsRstart")[0]]
     *X, jog = (
         x[::4] for x in DirectionCosines(bunch.skeleton).fit_transform([*bends.data[:6], jog])

@@ -1,4 +1,4 @@
-"""The classifier: against its kernel written out, of few performances, of unknown actions."""
+"""The classifier: against its kernel written out, of few trials, of unknown actions."""
 
 import json
 import pickle
@@ -29,7 +29,7 @@ from sklearn_motionsync import (
     synchronization_distances,
     to_frame,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.display import SkeletonDisplay
 from sklearn_motionsync.recognition.classifier import choose_landmarks
 from sklearn_motionsync.recognition.distances import PairwiseDistance
@@ -72,7 +72,7 @@ def fitted(known):
 
 
 def few(X, y, n):
-    """The first n performances of every class."""
+    """The first n trials of every class."""
     chosen = [i for kind in KINDS for i in np.flatnonzero(y == kind)[:n]]
     return [X[i] for i in chosen], y[chosen]
 
@@ -87,8 +87,8 @@ def slow_kernel(X, new, gamma, weights):
     unit = np.sqrt(np.mean([((x - centre) ** 2).sum(axis=1).mean() for x in X]))
     X, new = ([(x - centre) / unit for x in some] for some in (X, new))
     kernels = {}
-    for cost in ("velocity", "elastic", "posture"):
-        settings = {"cost": cost, "normalize": cost != "posture", "n_frames": 30, "max_offset": 0.4}
+    for cost in ("velocity", "elastic", "pose"):
+        settings = {"cost": cost, "normalize": cost != "pose", "n_frames": 30, "max_offset": 0.4}
         D = synchronization_distances(X, **settings)
         median = np.median(D[np.triu_indices(len(X), 1)])
         kernels[cost] = np.exp(-gamma * synchronization_distances(new, X, **settings) / median)
@@ -120,7 +120,7 @@ def slow_kernel(X, new, gamma, weights):
         median = np.median(np.array(apart)[np.triu_indices(len(X), 1)])
         alike = [[-gamma * ((a - b) ** 2).sum() / median for b in Z] for a in z]
         kernels[summarise.__name__] = np.exp(alike)
-    names = ("velocity", "elastic"), ("posture",), ("seen",), ("extremes", "shares")
+    names = ("velocity", "elastic"), ("pose",), ("seen",), ("extremes", "shares")
     views = [np.mean([kernels[name] for name in some], axis=0) for some in names]
     return sum(weight * view for weight, view in zip(weights, views, strict=True))
 
@@ -132,7 +132,7 @@ def test_decisions_equal_those_of_slow_kernels(known, new):
     classifier = ActionClassifier(n_frames=30, gamma=gamma, C=3).fit(X, y, groups=people)
     weights = classifier.weights_
     A, b = KernelRegression(slow_kernel(X, X, gamma, weights), 3).fit(codes)
-    # Performances of two frames, which are fewer than are averaged for the ends, are no exception.
+    # Trials of two frames, which are fewer than are averaged for the ends, are no exception.
     asked = [*new[0], new[0][0][:2]]
     expected = decision_values(slow_kernel(X, asked, gamma, weights), A, b)
     np.testing.assert_allclose(classifier.decision_function(asked), expected, atol=2e-4)
@@ -168,7 +168,7 @@ def test_groups_lower_temperature_threshold_and_held_out_values(known, fitted):
     people = np.arange(30) % 10 // 2
     X = [x + 2 * np.sin(5 * p) for x, p in zip(X, people, strict=True)]
     # One view, as weights of several would take care of such people.
-    one = {"costs": "posture", "summaries": False, "n_frames": 20}
+    one = {"costs": "pose", "summaries": False, "n_frames": 20}
     named = ActionClassifier(**one).fit(X, y, groups=people)
     unnamed = ActionClassifier(**one).fit(X, y)
     assert named.temperature_ != unnamed.temperature_
@@ -187,7 +187,7 @@ def test_groups_lower_temperature_threshold_and_held_out_values(known, fitted):
 # -- invariances ------------------------------------------------------------------------
 
 
-def test_decisions_do_not_depend_on_other_performances_or_jobs(known, fitted, new):
+def test_decisions_do_not_depend_on_other_trials_or_jobs(known, fitted, new):
     decisions = fitted.decision_function(new[0])
     for i in (0, 5):
         np.testing.assert_array_equal(fitted.decision_function([new[0][i]])[0], decisions[i])
@@ -310,7 +310,7 @@ def test_landmarks_are_chosen_evenly_from_classes_and_groups():
         assert np.ptp(of_groups) <= 1
     without = choose_landmarks(codes, None, 100)
     assert (np.bincount(codes[without]) == counts).all()
-    # Spread over a class, as performances of one person come one after the other.
+    # Spread over a class, as trials of one person come one after the other.
     many = np.flatnonzero(codes == 0)
     at = np.searchsorted(many, without[codes[without] == 0])
     assert np.diff(at, prepend=0, append=len(many)).max() < 3 * len(many) / len(at)
@@ -370,16 +370,16 @@ def test_fit_and_predict_compare_with_landmarks_only(monkeypatch):
 # -- small training sets ---------------------------------------------------------------
 
 
-def test_one_performance_a_class(known, new):
+def test_one_trial_a_class(known, new):
     X, y = few(*known[:2], 1)
     classifier = ActionClassifier(n_frames=30).fit(X, y)
     assert classifier.score(new[0], new[1]) > 0.9
     assert np.isfinite(classifier.predict_proba(new[0])).all()
-    with pytest.raises(ValueError, match="The class 'rise' has one performance: a model needs"):
+    with pytest.raises(ValueError, match="The class 'rise' has one trial: a model needs"):
         classifier.model_of("rise")
     two = ActionClassifier(n_frames=8).fit(X[:2], y[:2])
     assert two.temperature_ == pytest.approx(4)
-    with pytest.raises(ValueError, match="There is no threshold, as no performance could be held"):
+    with pytest.raises(ValueError, match="There is no threshold, as no trial could be held"):
         two.threshold_at(0.95)
 
 
@@ -398,7 +398,7 @@ def test_a_class_of_one_group_is_held_out(known, new):
     assert classifier.temperature_ == pytest.approx(4)
 
 
-def test_identical_performances_have_equal_probabilities(known):
+def test_identical_trials_have_equal_probabilities(known):
     for X in ([known[0][0]] * 4, [np.full((5, 2), 3.0)] * 4):
         classifier = ActionClassifier(n_frames=8).fit(X, [0, 0, 1, 1])
         np.testing.assert_allclose(classifier.predict_proba(X), 0.5, atol=1e-3)
@@ -454,7 +454,7 @@ def test_classifier_in_cross_validation_searches_and_ensembles(bends):
     X, y, people, pipe = bends
     assert cross_val_score(pipe, X, y, groups=people, cv=GroupKFold(2)).mean() > 0.9
     world = DirectionCosines(pipe[0].skeleton, "world")
-    quick = make_pipeline(world, ActionClassifier("posture", n_frames=8))
+    quick = make_pipeline(world, ActionClassifier("pose", n_frames=8))
     stack = StackingClassifier([("a", quick), ("b", quick)], LogisticRegression(), cv=2)
     assert stack.fit(X, y).score(X, y) > 0.9
     reached = pipe.fit(X, y, actionclassifier__groups=people)[-1].temperature_
@@ -476,9 +476,9 @@ def test_tables_give_the_same_probabilities(bends):
     np.testing.assert_array_equal(framed.predict_proba(table), expected)
     assert list(framed[-1].feature_names_in_)[:2] == ["pelvis_height", "hip_x"]
     assert list(framed[-1].model_of("half")[0].feature_names_in_)[:1] == ["pelvis_height"]
-    new = to_frame(X[11:13], performances=list("pq"), columns=pipe[0].skeleton.column_names)
+    new = to_frame(X[11:13], trials=list("pq"), columns=pipe[0].skeleton.column_names)
     found = find_departures(framed, new, limit=1)
-    assert set(zip(found["performance"], found["class"], strict=True)) == {
+    assert set(zip(found["trial"], found["class"], strict=True)) == {
         ("p", "bend"),
         ("q", "half"),
     }
@@ -487,7 +487,7 @@ def test_tables_give_the_same_probabilities(bends):
 # -- models of classes --------------------------------------------------------------------------
 
 
-def test_model_of_a_class_is_fitted_on_its_performances(bends):
+def test_model_of_a_class_is_fitted_on_its_trials(bends):
     X, y, people, pipe = bends
     pipe.fit(X, y, actionclassifier__groups=people)
     mine = [X[i] for i in np.flatnonzero(y == "half")]
@@ -507,28 +507,28 @@ def test_departures_are_those_from_the_predicted_class(bends):
     new = [X[13].copy(), X[0], X[14], X[1]]
     new[0][5:12, 3 * pipe[0].skeleton.index_of("left_wrist") + 1] += 0.4
     found = find_departures(pipe, new, limit=0.1)
-    classes = found.groupby("performance")["class"].unique()
+    classes = found.groupby("trial")["class"].unique()
     assert classes.explode().to_dict() == {0: "half", 1: "bend", 2: "half", 3: "bend"}
-    assert found["performance"].is_monotonic_increasing
+    assert found["trial"].is_monotonic_increasing
     assert found["feature"][0].startswith("left_forearm")
     half = make_pipeline(*pipe[:-1], *pipe[-1].model_of("half"))
-    expected = find_departures(half, new[::2], limit=0.1).drop(columns="performance")
-    own = found[found["class"] == "half"].drop(columns=["class", "performance"])
+    expected = find_departures(half, new[::2], limit=0.1).drop(columns="trial")
+    own = found[found["class"] == "half"].drop(columns=["class", "trial"])
     pd.testing.assert_frame_equal(own.reset_index(drop=True), expected)
-    display = SkeletonDisplay.from_departures(pipe, new, performance=2, limit=1)
+    display = SkeletonDisplay.from_departures(pipe, new, trial=2, limit=1)
     assert display.heading.startswith("Trial 2, most like 'half', is accepted by the model")
     alone = SkeletonDisplay.from_departures(half, [new[2]], limit=1)
     assert display.titles == alone.titles
     np.testing.assert_allclose(np.array(display.scenes), np.array(alone.scenes))
-    with pytest.raises(ValueError, match=r"performance must be from 0 to 3, got \[7\]"):
-        SkeletonDisplay.from_departures(pipe, new, performance=7)
+    with pytest.raises(ValueError, match=r"trial must be from 0 to 3, got \[7\]"):
+        SkeletonDisplay.from_departures(pipe, new, trial=7)
 
 
 def test_departures_of_a_bare_classifier_and_unknown_params(known, fitted):
     x = known[0][3].copy()
     x[10:14, 1] += 4
     found = find_departures(fitted, [x])
-    assert found.loc[0, ["performance", "class", "feature"]].tolist() == [0, "wave", "x1"]
+    assert found.loc[0, ["trial", "class", "feature"]].tolist() == [0, "wave", "x1"]
     rows = np.stack([np.sin(np.linspace(0, k, 30)) for k in (3, 3.1, 3.2, 8, 8.1, 8.2)])
     classifier = ActionClassifier(n_frames=15).fit(rows, [0, 0, 0, 1, 1, 1])
     assert set(find_departures(classifier, rows, limit=0.4)["class"]) == {0, 1}
@@ -542,7 +542,7 @@ def test_departures_of_a_bare_classifier_and_unknown_params(known, fitted):
 def test_new_people_and_an_unknown_action(real_data):
     """The first of the published halves of ten people, an action left out, and what is rejected."""
     folder = real_data / "utkinect"
-    bunch = load_performances(folder / "utkinect_positions.npz")
+    bunch = load_trials(folder / "utkinect_positions.npz")
     splits = json.loads((folder / "utkinect_splits.json").read_text())
     X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
     number = np.array([int(actor[1:]) for actor in bunch.actor])

@@ -1,4 +1,4 @@
-"""Distances between performances: against plain loops, closed forms and people."""
+"""Distances between trials: against plain loops, closed forms and people."""
 
 import itertools
 
@@ -8,7 +8,7 @@ import pytest
 from joblib import parallel_config
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn_motionsync import DirectionCosines, synchronization_distances, to_frame
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.recognition import distances
 from sklearn_motionsync.recognition.distances import (
     BLOCK,
@@ -32,7 +32,7 @@ def walks(n, n_features=3, seed=0, shortest=3, longest=60):
 
 RATES = np.arange(5)
 COSTS = {
-    "posture": {s: (1.0, 2.0, abs(s - 1.0)) for s in RATES},
+    "pose": {s: (1.0, 2.0, abs(s - 1.0)) for s in RATES},
     "velocity": {s: ((0.8 + 0.2 * s) ** 2, 2 * (0.8 + 0.2 * s), (s - 1.0) ** 2) for s in RATES},
     "elastic": {s: (float(s), 2 * np.sqrt(s), (s - 1.0) ** 2) for s in RATES},
 }
@@ -41,7 +41,7 @@ COSTS = {
 def slow_features(x, cost, n_frames, smoothing, normalize):
     at = np.linspace(0, len(x) - 1, n_frames)
     x = np.column_stack([np.interp(at, np.arange(len(x)), column) for column in x.T])
-    if cost != "posture":
+    if cost != "pose":
         x = oracle.slow_filter(x, smoothing * (n_frames - 1), 1)
     if cost == "elastic":
         x = x / np.sqrt(np.linalg.norm(x, axis=1, keepdims=True))
@@ -135,7 +135,7 @@ def test_blocks_hold_every_pair_once_and_nothing_else(n_bases, n_moving):
     assert (counts == 1).all()
     sizes = [len(range(*r.indices(n_bases))) * len(range(*c.indices(n_moving))) for r, c in blocks]
     assert max(sizes) <= BLOCK**2
-    # A single performance does not take more blocks than its share of many.
+    # A single trial does not take more blocks than its share of many.
     if n_bases == 1:
         assert len(blocks) == -(-n_moving // BLOCK**2)
 
@@ -178,12 +178,12 @@ def test_verbose_prints_progress(capsys):
     synchronization_distances(walks(20), walks(3), n_frames=8, verbose=1)
     lines = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in lines] == [
-        "[synchronization_distances] comparing 20 with 3 performances",
-        "[synchronization_distances] comparing 3 with 20 performances",
+        "[synchronization_distances] comparing 20 with 3 trials",
+        "[synchronization_distances] comparing 3 with 20 trials",
     ]
 
 
-# -- units and still performances ------------------------------------------------------
+# -- units and still trials ------------------------------------------------------
 
 
 @pytest.mark.parametrize("cost", COSTS)
@@ -202,7 +202,7 @@ def test_normalized_distances_do_not_depend_on_units(cost):
 
 @pytest.mark.parametrize("cost", ["velocity", "elastic"])
 @pytest.mark.parametrize("at", [0, 1e6 / 3, -7e-9])
-def test_still_performances_are_far_from_moving_ones(cost, at):
+def test_still_trials_are_far_from_moving_ones(cost, at):
     X = walks(4, longest=30)
     still = [np.full((n, 3), at) for n in (2, 9, 40)]
     D = synchronization_distances(still, [*X, *still], cost=cost, smoothness=0, max_offset=0)
@@ -230,10 +230,10 @@ def test_every_kind_of_collection_gives_the_same_distances():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"Y": walks(2, 4)}, "Performance 0 has 4 features a frame, but synchronization_distances"),
+        ({"Y": walks(2, 4)}, "Trial 0 has 4 features a frame, but synchronization_distances"),
         ({"Y": np.ones((2, 9))}, "wrap one sequence as"),
-        ({"Y": [np.full((5, 3), np.nan)]}, "Performance 0, frame 0, feature 0 is NaN"),
-        ({"X": []}, "0 performances"),
+        ({"Y": [np.full((5, 3), np.nan)]}, "Trial 0, frame 0, feature 0 is NaN"),
+        ({"X": []}, "0 trials"),
         ({"cost": "speed"}, "'cost' parameter of synchronization_distances"),
         ({"normalize": "rms"}, "'normalize' parameter"),
     ],
@@ -257,7 +257,7 @@ def test_two_frames_and_a_rate_above_the_number_of_frames():
 
 def test_nearest_neighbours_among_new_people(real_data):
     """The nearest clip of nine other people is of the same action, with normalize."""
-    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    bunch = load_trials(real_data / "utkinect" / "utkinect_positions.npz")
     X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
     right = {}
     for normalize in (True, False):

@@ -1,4 +1,4 @@
-"""The views of performances and their weights: against convolutions, loops and simulated people."""
+"""The views of trials and their weights: against convolutions, loops and simulated people."""
 
 import numpy as np
 import pytest
@@ -130,10 +130,10 @@ def test_groups_take_the_weight_off_what_tells_people_apart():
     classifier = ActionClassifier(n_frames=25).fit(known, y[train], groups=people[train])
     assert classifier.weights_.shape == (4,)
     assert classifier.weights_.sum() == pytest.approx(1)
-    postures, summaries = classifier.weights_[1:3]
-    assert classifier.weights_[[0, 3]].min() > 10 * max(postures, summaries)
+    poses, summaries = classifier.weights_[1:3]
+    assert classifier.weights_[[0, 3]].min() > 10 * max(poses, summaries)
     assert classifier.score(new, y[test]) == 1
-    alone = ActionClassifier("posture", n_frames=25, summaries=False)
+    alone = ActionClassifier("pose", n_frames=25, summaries=False)
     alone.fit(known, y[train], groups=people[train])
     np.testing.assert_array_equal(alone.weights_, [1])
     assert alone.score(new, y[test]) < 1
@@ -142,9 +142,9 @@ def test_groups_take_the_weight_off_what_tells_people_apart():
 @pytest.mark.parametrize(
     ("costs", "summaries", "n_views"),
     [
-        (("velocity", "posture"), True, 4),
+        (("velocity", "pose"), True, 4),
         ("elastic", True, 3),
-        (("posture", "velocity"), False, 2),
+        (("pose", "velocity"), False, 2),
         ((), True, 2),
     ],
 )
@@ -154,5 +154,5 @@ def test_views_are_those_that_are_asked_for(costs, summaries, n_views):
     weights = classifier.fit(X, y, groups=people).weights_
     assert weights.shape == (n_views,)
     if n_views == 2 and costs:
-        # Shape comes before postures, in whatever order the costs are named.
+        # Shape comes before poses, in whatever order the costs are named.
         assert weights[0] > weights[1]

@@ -1,11 +1,11 @@
-"""Labels of classes and of rejected performances: of any type, none is ever taken for another."""
+"""Labels of classes and of rejected trials: of any type, none is ever taken for another."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import ActionClassifier
 
-# Two movements, five performances each.
+# Two movements, five trials each.
 T = np.linspace(0, 1, 20)
 X = [np.column_stack([np.sin((3 + 3 * (i > 4)) * T), np.cos((4 + i / 9) * T)]) for i in range(10)]
 LIMITS = {name: np.iinfo(name) for name in ("int8", "uint8", "int16", "int64", "uint64")}
@@ -36,7 +36,7 @@ TEXTS = ["unknown", "?", "unkn", "a\0", "", "-1", "nan", np.str_("b")]
 
 
 def fit(pair):
-    """A classifier of five performances a class, and its classes as they were given."""
+    """A classifier of five trials a class, and its classes as they were given."""
     given = list(pair)
     if isinstance(pair, list):
         y = [given[0]] * 5 + [given[1]] * 5
@@ -57,7 +57,7 @@ def equal(found, given):
 
 
 @pytest.mark.parametrize("name", PAIRS)
-def test_rejected_performances_never_have_a_class(name):
+def test_rejected_trials_never_have_a_class(name):
     pair, kind = PAIRS[name]
     classifier, given = fit(pair)
     plain = classifier.predict(X)

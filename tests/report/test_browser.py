@@ -66,7 +66,7 @@ async function visit(width) {
   there.querySelectorAll("button[data-file]").forEach((button) => button.click());
 
   // Without a screen a browser draws when it likes.
-  own.requestAnimationFrame = (f) => own.setTimeout(() => f(own.performance.now()), 16);
+  own.requestAnimationFrame = (f) => own.setTimeout(() => f(own.trial.now()), 16);
   if (find("stage")) {
     const canvases = () => [...find("stage").querySelectorAll("canvas")];
     const picture = () => canvases().map((one) => one.toDataURL()).join();
@@ -186,7 +186,7 @@ def gait(tmp_path_factory):
     bunch = make_gait(8, 2, timing=8, random_state=0)
     trials = [pd.DataFrame(x, columns=bunch.feature_names) for x in bunch.data]
     for k, x in enumerate(trials):
-        x.attrs["performance"] = f"Jürgen </script> {'long ' * 20}{k}"
+        x.attrs["trial"] = f"Jürgen </script> {'long ' * 20}{k}"
     path = write_report(
         folder / "report.html",
         DenseSynchronizer(51).fit(trials),
@@ -255,8 +255,8 @@ def test_the_player_draws_and_its_controls_work(bending):
         check_steps(
             found, ["start", "moved", "turned", "seen", "other", "recorded", "key", "played"]
         )
-        assert found["start"][1].startswith("At 0 % of the template, trial ")
-        assert found["moved"][1].startswith("At 50 % of the template, trial ")
+        assert found["start"][1].startswith("At 0 % of the pattern, trial ")
+        assert found["moved"][1].startswith("At 50 % of the pattern, trial ")
         assert (found["count"], found["other"][2], found["shown"]) == (2, 3, "Trials: 3 of 6")
         assert found["recorded"][1].startswith("After ")
         assert " s, trial 0 is at " in found["recorded"][1]
@@ -266,7 +266,7 @@ def test_a_player_by_itself(players):
     for found in players["aligned"]:
         check_steps(found, ["start", "moved", "turned", "seen", "recorded", "key", "played"])
         assert (found["count"], found["frames"]) == (5, 31)
-        assert found["moved"][1] == "At 50 % of the template."
+        assert found["moved"][1] == "At 50 % of the pattern."
         # Each at its own pace; one does not have the first key-frame.
         assert len(found["marks"]) == 4 + 5
         assert found["jumped"] == pytest.approx(sorted(found["jumped"]))

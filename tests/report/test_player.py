@@ -115,7 +115,7 @@ def test_without_a_frame_rate_or_a_match(tmp_path):
     assert data["pace"] * data["median"] == pytest.approx(4)
     tables = [pd.DataFrame(x) for x in BENDS.data]
     for k, x in enumerate(tables):
-        x.attrs |= {"frame_rate": 20.0 + k, "performance": f"bend {k}"}
+        x.attrs |= {"frame_rate": 20.0 + k, "trial": f"bend {k}"}
     data = write(tmp_path, tables).data["player"]
     assert data["names"][3] == "bend 3"
     assert data["durations"][3] == pytest.approx((len(tables[3]) - 1) / 23)
@@ -138,7 +138,7 @@ def test_keyframes_are_marked_on_both_axes_of_time(tmp_path):
     assert (only["name"], only["clock"]) == ("key-frame 0", None)
 
 
-def test_points_without_bones_gaps_and_one_performance(tmp_path):
+def test_points_without_bones_gaps_and_one_trial(tmp_path):
     x = BENDS.data[0].copy()
     x[5:9, :3] = np.nan
     data = write(tmp_path, x, None).data["player"]
@@ -149,7 +149,7 @@ def test_points_without_bones_gaps_and_one_performance(tmp_path):
     assert write(tmp_path, skeleton=bare).data["player"]["dots"] == list(range(15))
 
 
-def test_long_performances_have_fewer_frames_and_the_page_names_it(tmp_path, monkeypatch):
+def test_long_trials_have_fewer_frames_and_the_page_names_it(tmp_path, monkeypatch):
     monkeypatch.setattr(player, "MOST_COORDINATES", 5 * 20 * 14 * 3)
     page = write(tmp_path)
     data = page.data["player"]
@@ -178,16 +178,16 @@ def test_a_report_has_the_same_player(tmp_path):
 @pytest.mark.parametrize(
     ("given", "error", "message"),
     [
-        ({"X": BENDS.data * 5}, ValueError, r"X has 25 performances, .* 24 .* such as X\[:24\]"),
-        ({"X": [BENDS.data[0], BENDS.data[1][:1]]}, ValueError, "Performance 1 has 1 frame"),
+        ({"X": BENDS.data * 5}, ValueError, r"X has 25 trials, .* 24 .* such as X\[:24\]"),
+        ({"X": [BENDS.data[0], BENDS.data[1][:1]]}, ValueError, "Trial 1 has 1 frame"),
         ({"names": ["a"]}, ValueError, "names must be a list of text, one for each of the 5"),
-        ({"match": Match([[0, 1, 2]])}, ValueError, "match must be of the 5 performances of X"),
+        ({"match": Match([[0, 1, 2]])}, ValueError, "match must be of the 5 trials of X"),
         ({"match": DenseSynchronizer()}, ValueError, "not fitted"),
-        ({"keyframes": [[3]]}, ValueError, "one row a performance"),
-        ({"keyframes": [[3]] * 4 + [[99]]}, ValueError, "Key-frame 0 of performance 4 is 99"),
+        ({"keyframes": [[3]]}, ValueError, "one row a trial"),
+        ({"keyframes": [[3]] * 4 + [[99]]}, ValueError, "Key-frame 0 of trial 4 is 99"),
         ({"skeleton": "acclaim"}, ValueError, "skeleton must be a Skeleton"),
         ({"frame_rate": 0}, ValueError, "frame_rate"),
-        ({"X": []}, ValueError, "0 performances"),
+        ({"X": []}, ValueError, "0 trials"),
     ],
 )
 def test_refused_arguments_leave_the_file_as_it_was(tmp_path, given, error, message):

@@ -32,7 +32,7 @@ from sklearn_motionsync.report import page, player, report
 GAIT = make_gait(8, 2, timing=8, random_state=0)
 TRIALS = [pd.DataFrame(x, columns=GAIT.feature_names) for x in GAIT.data]
 for k, x in enumerate(TRIALS):
-    x.attrs |= {"units": list(GAIT.units), "performance": f"walk {k}", "frame_rate": 100.0}
+    x.attrs |= {"units": list(GAIT.units), "trial": f"walk {k}", "frame_rate": 100.0}
 GIVEN = {"groups": GAIT.group, "people": GAIT.person}
 SYNC = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(51)).fit(TRIALS)
 # It is quick, and compares nothing again without some of its features.
@@ -89,9 +89,9 @@ def groups(tmp_path_factory):
 
 def test_the_set_and_what_was_left_out(groups):
     assert groups.headings == ["The set", "Before and after", "Timing", "Groups", "Doubtful trials"]
-    template = SYNC[-1].pattern_index_
+    pattern = SYNC[-1].pattern_index_
     assert "16 trials of 8 people in 2 groups, on 51 frames." in groups.text
-    assert f"The template is trial walk {template}." in groups.text
+    assert f"The pattern is trial walk {pattern}." in groups.text
     assert "Left out before: 2 trials trial reason walk 99 it was cut off 7 no force" in groups.text
     assert "DenseSynchronizer(n_frames=51)" in groups.text
     seconds = [(len(x) - 1) / 100 for x, g in zip(TRIALS, GAIT.group, strict=True) if g == "B"]
@@ -99,7 +99,7 @@ def test_the_set_and_what_was_left_out(groups):
     table = groups.table("trials")
     assert table["trial"].tolist() == [f"walk {k}" for k in range(16)]
     assert table["seconds"].tolist() == [(len(x) - 1) / 100 for x in TRIALS]
-    assert table["template"].tolist() == [k == template for k in range(16)]
+    assert table["pattern"].tolist() == [k == pattern for k in range(16)]
 
 
 def test_tables_hold_the_numbers_of_the_match(groups):
@@ -173,7 +173,7 @@ def test_rows_seconds_and_synchronizers_that_do_not_tell(tmp_path):
     sync = LinearSynchronizer(20).fit(rows)
     page = Text(write_report(tmp_path / "a.html", sync, rows, frame_rate=10, unit="seconds"))
     assert "does not tell which trials" in page.text
-    assert "No trial is later or earlier than the template." in page.text
+    assert "No trial is later or earlier than the pattern." in page.text
     assert page.table("trials")["seconds"].tolist() == [3.9] * 6
     assert page.table("timing")["offset (s)"].abs().max() == 0
     one = Text(write_report(tmp_path / "b.html", sync, rows[:1]))
@@ -216,7 +216,7 @@ def test_bodies_have_a_player(tmp_path):
     data, match = page.data["player"], Match.from_estimator(pipe, BENDING.data)
     assert "Stick figures" in page.headings
     assert data["counts"] == [len(x) for x in BENDING.data]
-    assert data["names"][pipe[-1].pattern_index_].endswith("(template)")
+    assert data["names"][pipe[-1].pattern_index_].endswith("(pattern)")
     assert len(data["shown"]) == 2
     assert pipe[-1].pattern_index_ in data["shown"]
     warps = np.frombuffer(base64.b64decode(data["warps"]), "<u2").reshape(6, 30) / 65535
@@ -257,7 +257,7 @@ def test_sizes_are_limited_and_the_page_names_it(tmp_path, monkeypatch):
 
 
 def tables_step(page):
-    return int(np.diff(page.table("timing")["frame of the template"].unique())[0])
+    return int(np.diff(page.table("timing")["frame of the pattern"].unique())[0])
 
 
 # -- the file -------------------------------------------------------------------------------
@@ -267,7 +267,7 @@ def test_what_users_give_is_text_and_no_markup(tmp_path):
     evil = "</script><script>alert(\"x\")</script> & 'quotes' <b>"
     tables = [x.rename(columns={"hip_flexion": evil}) for x in TRIALS]
     for k, x in enumerate(tables):
-        x.attrs["performance"] = f"{k} {evil}"
+        x.attrs["trial"] = f"{k} {evil}"
     people = [f"{evil} {p}" for p in GAIT.person]
     group = [f"{g} $x$ {evil}" for g in GAIT.group]
     sync = LinearSynchronizer(20).fit(tables)

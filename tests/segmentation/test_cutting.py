@@ -1,10 +1,10 @@
-"""Performances that are cut out of takes."""
+"""Trials that are cut out of takes."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import LinearSynchronizer, to_frame, to_sequences
-from sklearn_motionsync.inputs.validation import check_performances
+from sklearn_motionsync import LinearSynchronizer, to_frame, to_trials
+from sklearn_motionsync.inputs.validation import check_trials
 from sklearn_motionsync.segmentation.cutting import cut_takes
 
 ROWS = pd.DataFrame(
@@ -14,7 +14,7 @@ TAKES = [np.arange(12.0).reshape(6, 2), np.arange(20, dtype=np.float32).reshape(
 
 
 def cut(X):
-    takes = check_performances(LinearSynchronizer(), X, reset=True, level="sequence")
+    takes = check_trials(LinearSynchronizer(), X, reset=True, level="sequence")
     return cut_takes(X, takes, ROWS)
 
 
@@ -32,7 +32,7 @@ def test_tables_keep_columns_and_attrs():
     for table in tables:
         table.attrs["fps"] = 60
     parts, _ = cut(tables)
-    assert [part.attrs["performance"] for part in parts] == [(1, 1), (0, 0), (1, 0)]
+    assert [part.attrs["trial"] for part in parts] == [(1, 1), (0, 0), (1, 0)]
     assert all(part.attrs["fps"] == 60 for part in parts)
     df = to_frame(parts)
     assert df.index.names == ["take", "part", "frame"]
@@ -41,7 +41,7 @@ def test_tables_keep_columns_and_attrs():
 
 
 @pytest.mark.parametrize("step", [1, 2])
-def test_events_and_times_are_those_of_the_performance(step):
+def test_events_and_times_are_those_of_the_trial(step):
     number = np.arange(20.0 * step)
     table = pd.DataFrame({"number": number, "knee": number**2})
     table.attrs = {"frame_rate": 120.0, "first_time": 2.0, "first_frame": 7, "rows": [0, 9]}
@@ -61,17 +61,17 @@ def test_events_and_times_are_those_of_the_performance(step):
     assert "events" not in part.attrs
 
 
-def test_performances_are_labelled_by_their_take():
+def test_trials_are_labelled_by_their_take():
     long = pd.concat({("ann", 1): pd.DataFrame(TAKES[0]), ("bob", 1): pd.DataFrame(TAKES[1])})
     long.index.names = ["subject", "trial", "frame"]
-    parts, locations = cut(to_sequences(long))
-    assert parts[0].attrs["performance"] == ("bob", 1, 1)
+    parts, locations = cut(to_trials(long))
+    assert parts[0].attrs["trial"] == ("bob", 1, 1)
     assert to_frame(parts).index.names == ["subject", "trial", "part", "frame"]
     assert locations["take"].tolist() == [("bob", 1), ("ann", 1), ("bob", 1)]
 
 
-def test_no_rows_give_no_performances():
-    takes = check_performances(LinearSynchronizer(), TAKES, reset=True, level="sequence")
+def test_no_rows_give_no_trials():
+    takes = check_trials(LinearSynchronizer(), TAKES, reset=True, level="sequence")
     parts, locations = cut_takes(TAKES, takes, ROWS[:0])
     assert parts == []
     assert list(locations.columns) == list(ROWS.columns)

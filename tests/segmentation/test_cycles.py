@@ -16,7 +16,7 @@ from sklearn_motionsync import (
     FrameWise,
     Skeleton,
     to_frame,
-    to_sequences,
+    to_trials,
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import CycleDisplay
@@ -136,39 +136,39 @@ def test_takes_of_other_frame_rates_are_cut_at_the_same_phase(gait, fitted):
         CycleSegmenter(start=HIP, period=(20, 200)).fit(tables)
 
 
-def test_a_template_of_constant_periods_is_blurred():
+def test_a_pattern_of_constant_periods_is_blurred():
     take, _ = slowing_take()
     sizes = [
-        np.square(CycleSegmenter(start=0, refine=refine).fit(take).template_).mean()
+        np.square(CycleSegmenter(start=0, refine=refine).fit(take).pattern_).mean()
         for refine in (False, True)
     ]
     assert sizes[0] < 0.9 * sizes[1]
 
 
 @pytest.mark.parametrize("size", [1e-6, 1, 1e6])
-def test_score_is_the_cosine_with_the_template(size):
-    take, template = (
+def test_score_is_the_cosine_with_the_pattern(size):
+    take, pattern = (
         SampledStretch(slowing_take()[0], 100),
         np.random.default_rng(0).normal(size=(32, 6)),
     )
-    take.values = size * template[np.arange(len(take.times)) % 32]
+    take.values = size * pattern[np.arange(len(take.times)) % 32]
     phases = np.arange(len(take.times)) / 32
-    rows = list(locate_cycles(take, phases, template, False))
+    rows = list(locate_cycles(take, phases, pattern, False))
     assert len(rows) == 8
     np.testing.assert_allclose([score for *_, score in rows], 1)
     # A cycle has the sample at its first frame, and not that of the next one.
     plain, odd = take.values, take.values.copy()
     odd[: len(odd) // 2 : 32] *= -1
-    inside = np.square(template).sum(axis=1)
+    inside = np.square(pattern).sum(axis=1)
     take.values, first = odd, 1 - 2 * inside[0] / inside.sum()
-    scores = [r[-1] for r in locate_cycles(take, phases, template, False)]
+    scores = [r[-1] for r in locate_cycles(take, phases, pattern, False)]
     np.testing.assert_allclose(scores, [first] * 4 + [1] * 4)
     for factor in (-1, 0):
         take.values = factor * plain
-        rows = list(locate_cycles(take, phases, template, True))
+        rows = list(locate_cycles(take, phases, pattern, True))
         np.testing.assert_allclose([score for *_, score in rows], factor)
         assert not any(complete for _, _, complete, _ in rows)
-        assert list(locate_cycles(take, phases, template, False)) == []
+        assert list(locate_cycles(take, phases, pattern, False)) == []
 
 
 def test_incomplete_adds_the_first_and_last_part_cycle():
@@ -235,7 +235,7 @@ def test_warns_where_several_cycles_fit_and_period_selects_one():
     steady = np.sin(angle + np.arange(3)) + 0.5 * np.cos(2 * angle)
     beat = steady * np.repeat(np.tile([1, 0.4], 8), 40)[:, np.newaxis]
     segmenter = CycleSegmenter()
-    message = r"Performance 1: several cycles fit, of 38\.\d, 80\.0 frames; 80\.0 is taken"
+    message = r"Trial 1: several cycles fit, of 38\.\d, 80\.0 frames; 80\.0 is taken"
     X = [steady, beat]
     report = segmenter.report(X)
     assert [len(periods) for periods in report["periods"]] == [1, 2]
@@ -285,7 +285,7 @@ def squats(sizes, bounces=None):
 
 def labelled(take, label):
     table = pd.DataFrame(take)
-    table.attrs["performance"] = label
+    table.attrs["trial"] = label
     return table
 
 
@@ -296,7 +296,7 @@ def test_segment_warns_of_cycles_that_hold_several_repetitions():
     segmenter.segment([well])  # a warning is an error
     X = [labelled(well, "first"), labelled(tired, "second")]
     message = (
-        r"Performance 1 \('second'\): the cycle from start 440 to stop 681 has 241 frames, but the "
+        r"Trial 1 \('second'\): the cycle from start 440 to stop 681 has 241 frames, but the "
         r"period of the take is 80\.0\. It may hold several repetitions, .* 1 of 16 whole cycles\. "
         "Look at the cuts with CycleDisplay"
     )
@@ -325,16 +325,14 @@ def test_segment_warns_of_cycles_that_hold_part_of_a_repetition():
 
 def test_fit_refuses_takes_that_are_not_cyclic(gait):
     bunch = make_bending(2, random_state=0)
-    with pytest.raises(
-        ValueError, match=r"Performance 0: not cyclic.* 0.00 at 0.00 cycles; threshold"
-    ):
+    with pytest.raises(ValueError, match=r"Trial 0: not cyclic.* 0.00 at 0.00 cycles; threshold"):
         CycleSegmenter(bunch.skeleton).fit(bunch.data)
     noise = np.random.default_rng(0).normal(size=(200, 4))
     with pytest.raises(ValueError, match=r"not cyclic. Its .* 0\.\d\d at .*; threshold=0.4"):
         CycleSegmenter().fit(noise)
     short = gait.data[1][: round(1.52 * CycleSegmenter().report(gait.data)["period"][1])]
-    named = to_sequences(to_frame([gait.data[0], short], performances=["ann", "bob"]))
-    with pytest.raises(ValueError, match=r"Performance 1 \('bob'\): holds 1\.\d\d cycles"):
+    named = to_trials(to_frame([gait.data[0], short], trials=["ann", "bob"]))
+    with pytest.raises(ValueError, match=r"Trial 1 \('bob'\): holds 1\.\d\d cycles"):
         CycleSegmenter().fit(named)
     report = CycleSegmenter().report(named)
     assert report["cyclic"].to_dict() == {"ann": True, "bob": False}
@@ -371,9 +369,9 @@ def test_takes_that_are_not_cyclic_can_be_skipped(gait):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda x: np.where(np.eye(len(x), 4) > 0, np.nan, x), "Performance 1, frame 0, .* NaN"),
-        (lambda x: x[:, :3], "Performance 1 has 3 features a frame, performance 0 has 4"),
-        (lambda x: x[:, 0], "Performance 1 has shape"),
+        (lambda x: np.where(np.eye(len(x), 4) > 0, np.nan, x), "Trial 1, frame 0, .* NaN"),
+        (lambda x: x[:, :3], "Trial 1 has 3 features a frame, trial 0 has 4"),
+        (lambda x: x[:, 0], "Trial 1 has shape"),
     ],
 )
 def test_errors_name_the_bad_take(change, message, gait, fitted):
@@ -384,11 +382,11 @@ def test_errors_name_the_bad_take(change, message, gait, fitted):
 
 
 def test_refuses_wrong_input_and_parameters(gait, fitted):
-    with pytest.raises(ValueError, match="0 performances"):
+    with pytest.raises(ValueError, match="0 trials"):
         CycleSegmenter().fit([])
     with pytest.raises(ValueError, match=r"one take \(n_frames, n_features\), or a list"):
         fitted.segment(gait.data[0][:, 0])
-    with pytest.raises(ValueError, match=r"A set of performances is .*got float"):
+    with pytest.raises(ValueError, match=r"A set of trials is .*got float"):
         fitted.segment(3.0)
     with pytest.raises(ValueError, match="3 features a frame, but CycleSegmenter is expecting 4"):
         fitted.segment([x[:, :3] for x in gait.data])
@@ -469,7 +467,7 @@ def test_a_single_take_is_a_list_of_one(gait):
     table = pd.DataFrame(take, columns=list("hkaf"))
     cycles, locations = fit_and_segment(CycleSegmenter(start="h"), table)
     assert_same((cycles, locations), expected)
-    assert cycles[1].attrs["performance"] == (0, 1)
+    assert cycles[1].attrs["trial"] == (0, 1)
     assert list(to_frame(cycles).index.names) == ["take", "part", "frame"]
 
 
@@ -491,11 +489,11 @@ def test_float32_is_cut_at_the_same_frames(gait, fitted):
 
 
 def test_cycles_work_in_pipelines_and_cross_validation(gait):
-    takes = to_frame(gait.data, performances=gait.person, columns=gait.feature_names)
+    takes = to_frame(gait.data, trials=gait.person, columns=gait.feature_names)
     cycles, locations = fit_and_segment(CycleSegmenter(start="hip_flexion"), takes)
     assert set(locations["take"]) == set(gait.person)
     df = to_frame(cycles)
-    assert df.index.names == ["performance", "part", "frame"]
+    assert df.index.names == ["trial", "part", "frame"]
     pipe = make_pipeline(ASpace(3), DenseSynchronizer(30), ActionModel())
     scores = cross_val_score(pipe, cycles, groups=locations["take"], cv=GroupKFold(3))
     assert np.isfinite(scores).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import CycleSegmenter, gait_events
-from sklearn_motionsync.datasets import load_performances, make_walk
+from sklearn_motionsync.datasets import load_trials, make_walk
 from sklearn_motionsync.segmentation.stretches import move_to_events
 
 WALK = make_walk(4, n_strides=6, random_state=0)
@@ -54,7 +54,7 @@ def test_frame_rate_of_tables():
 
 
 def test_cuts_of_recorded_walks(real_data):
-    bunch = load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    bunch = load_trials(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
     segmenter = CycleSegmenter(bunch.skeleton, start="left strike", frame_rate=60)
     _, table = segmenter.fit(bunch.data[:6]).segment(bunch.data[6:])
     assert len(table) >= 12
@@ -78,5 +78,5 @@ def test_events_far_from_a_beginning_do_not_count():
 def test_refused():
     with pytest.raises(ValueError, match=r"start='left strike' needs skeleton="):
         CycleSegmenter(start="left strike").fit(WALK.data)
-    with pytest.raises(ValueError, match="The frame rate of performance 0 is not known"):
+    with pytest.raises(ValueError, match="The frame rate of trial 0 is not known"):
         CycleSegmenter(WALK.skeleton, start="left strike").fit(WALK.data)

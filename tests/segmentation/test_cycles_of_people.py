@@ -36,7 +36,7 @@ def test_single_actions_are_not_cyclic(cycles, read):
             takes = bunch.data[::3]
             assert not CycleSegmenter(bunch.skeleton).report(takes)["cyclic"].any(), label
     bunch = read("hdm05", cycles.ONE_CYCLE)
-    with pytest.raises(ValueError, match=r"Performance 0: (not cyclic|holds)"):
+    with pytest.raises(ValueError, match=r"Trial 0: (not cyclic|holds)"):
         CycleSegmenter(bunch.skeleton).fit(bunch.data)
 
 
@@ -51,12 +51,12 @@ def test_walks_of_too_few_cycles_are_rejected(n_cycles, read):
     for X in (short, slow):
         assert (segmenter.report(X)["cyclic"] == (n_cycles > 1.6)).mean() > 0.95
         if n_cycles < 1.6:
-            with pytest.raises(ValueError, match=r"Performance 0: holds 1\.[45]\d cycles"):
+            with pytest.raises(ValueError, match=r"Trial 0: holds 1\.[45]\d cycles"):
                 segmenter.fit(X)
 
 
 def test_matched_phases_of_foot_strikes_vary_less_than_at_constant_periods(cycles, read):
-    """On jogging; the template is that of the other three actors."""
+    """On jogging; the pattern is that of the other three actors."""
     bunch = read("hdm05", cycles.CYCLIC["hdm05"])
     strikes = [
         cycles.foot_strikes(x, bunch.skeleton, rate)

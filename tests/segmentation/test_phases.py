@@ -1,4 +1,4 @@
-"""Phases of takes along a template, and the cycles between them: each step by itself."""
+"""Phases of takes along a pattern, and the cycles between them: each step by itself."""
 
 from types import SimpleNamespace
 
@@ -14,7 +14,7 @@ from sklearn_motionsync.segmentation.stretches import (
 )
 
 ANGLES = 2 * np.pi * np.arange(PHASES) / PHASES
-TEMPLATE = np.column_stack([np.sin(ANGLES), np.cos(ANGLES), np.sin(2 * ANGLES)])
+PATTERN = np.column_stack([np.sin(ANGLES), np.cos(ANGLES), np.sin(2 * ANGLES)])
 
 
 def test_mean_cycle_is_that_of_every_sample_at_its_phase():
@@ -40,9 +40,9 @@ def test_portions_of_a_long_take_are_joined_in_the_middle_of_their_overlap():
     """Beyond it the phases are those of the later portion alone, but for whole cycles."""
     values = np.random.default_rng(7).normal(size=(19 * PHASES, 3))
     whole, overlap = 16 * PHASES, 2 * PHASES
-    joined = match_phases(TEMPLATE, SimpleNamespace(values=values))
-    early = match_phases(TEMPLATE, SimpleNamespace(values=values[: whole + overlap]))
-    late = match_phases(TEMPLATE, SimpleNamespace(values=values[whole:]))
+    joined = match_phases(PATTERN, SimpleNamespace(values=values))
+    early = match_phases(PATTERN, SimpleNamespace(values=values[: whole + overlap]))
+    late = match_phases(PATTERN, SimpleNamespace(values=values[whole:]))
     middle = whole + overlap // 2
     np.testing.assert_array_equal(joined[:middle], early[:middle])
     # Noise fits anywhere: the portions meet at different phases, the later one behind.
@@ -57,10 +57,10 @@ def test_cycles_end_where_their_phase_is_reached_and_are_scored_by_themselves():
     times, phases = np.arange(0, 320, 2.0), np.linspace(0.25, 5.25, 160)
     # It stands at phase 2.
     phases[np.abs(phases - 2) < 0.2] = 2
-    values = TEMPLATE[np.round(phases * PHASES).astype(int) % PHASES]
+    values = PATTERN[np.round(phases * PHASES).astype(int) % PHASES]
     values[phases >= 4] = np.random.default_rng(0).normal(size=((phases >= 4).sum(), 3))
     take = SimpleNamespace(times=times, values=values, begins=False, ends=False)
-    rows = list(locate_cycles(take, phases, TEMPLATE, incomplete=True))
+    rows = list(locate_cycles(take, phases, PATTERN, incomplete=True))
     stands = int(times[phases == 2][0])
     starts = [0, round(np.interp(1, phases, times)), stands]
     # Phase 4 is reached at 238.5 frames: from a half it is the later one.
@@ -68,11 +68,11 @@ def test_cycles_end_where_their_phase_is_reached_and_are_scored_by_themselves():
     starts += [round(np.interp(3, phases, times)), 239, round(np.interp(5, phases, times))]
     assert [row[0] for row in rows] == starts
     assert [row[1] for row in rows] == [start + 1 for start in [*starts[1:], 318]]
-    # The last but one is whole, and does not follow the template.
+    # The last but one is whole, and does not follow the pattern.
     assert [row[2] for row in rows] == [False, True, True, True, False, False]
     assert all(row[3] > 0.99 for row in rows[:4])
     assert max(row[3] for row in rows[4:]) < 0.5
-    whole = list(locate_cycles(take, phases, TEMPLATE, incomplete=False))
+    whole = list(locate_cycles(take, phases, PATTERN, incomplete=False))
     assert whole == rows[1:4]
 
 
@@ -80,17 +80,17 @@ def test_cycles_end_where_their_phase_is_reached_and_are_scored_by_themselves():
 def test_a_cycle_that_begins_or_ends_in_standing_is_no_whole_one(side):
     """Only where the take goes on there: else it was cut off in motion."""
     phases, stands = np.linspace(0.25, 4.75, 145), (0.95, 1.2) if side == "begins" else (3.8, 4.05)
-    values = TEMPLATE[np.round(phases * PHASES).astype(int) % PHASES]
+    values = PATTERN[np.round(phases * PHASES).astype(int) % PHASES]
     values = np.concatenate([values, np.roll(values, -8, axis=0)], axis=1)
-    template = np.concatenate([TEMPLATE, np.roll(TEMPLATE, -8, axis=0)], axis=1)
+    pattern = np.concatenate([PATTERN, np.roll(PATTERN, -8, axis=0)], axis=1)
     values[(phases > stands[0]) & (phases < stands[1]), 3:] *= 0.1
     take = SimpleNamespace(times=np.arange(145.0), values=values, begins=False, ends=False)
-    rows = list(locate_cycles(take, phases, template, incomplete=False))
+    rows = list(locate_cycles(take, phases, pattern, incomplete=False))
     assert len(rows) == 3
     setattr(take, side, True)
     rest = rows[1:] if side == "begins" else rows[:-1]
-    assert list(locate_cycles(take, phases, template, incomplete=False)) == rest
-    pieces = list(locate_cycles(take, phases, template, incomplete=True))
+    assert list(locate_cycles(take, phases, pattern, incomplete=False)) == rest
+    pieces = list(locate_cycles(take, phases, pattern, incomplete=True))
     assert [row[:3] for row in pieces if row[2]] == [row[:3] for row in rest]
     longest = max(row[1] - row[0] for row in pieces if not row[2])
     assert longest > 33
@@ -98,9 +98,9 @@ def test_a_cycle_that_begins_or_ends_in_standing_is_no_whole_one(side):
 
 def test_no_part_is_empty_where_a_take_begins_and_ends_with_a_whole_phase():
     phases = np.linspace(1, 3, 65)
-    values = np.tile(TEMPLATE, (3, 1))[:65]
+    values = np.tile(PATTERN, (3, 1))[:65]
     take = SimpleNamespace(times=np.arange(65.0), values=values, begins=False, ends=False)
-    rows = list(locate_cycles(take, phases, TEMPLATE, incomplete=True))
+    rows = list(locate_cycles(take, phases, PATTERN, incomplete=True))
     assert [row[:3] for row in rows] == [(0, 33, True), (32, 65, True)]
 
 

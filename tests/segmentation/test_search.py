@@ -1,4 +1,4 @@
-"""find_performances: planted movements, recordings, parameters and errors."""
+"""find_trials: planted movements, recordings, parameters and errors."""
 
 import copy
 import tracemalloc
@@ -17,9 +17,9 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    find_performances,
+    find_trials,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.matching.warps import normalise
@@ -53,7 +53,7 @@ def other(n_frames):
 
 
 def take_of(parts, n_frames=500, noise=0.02, seed=0):
-    """A take of noise about a posture, and movements at frames."""
+    """A take of noise about a pose, and movements at frames."""
     take = noise * np.random.default_rng(seed).standard_normal((n_frames, 3))
     for start, part in parts.items():
         take[start : start + len(part)] += part
@@ -64,7 +64,7 @@ def spans(locations):
     return locations[["start", "stop"]].to_numpy().tolist()
 
 
-# Six subjects, two performances each, each subject at another pace.
+# Six subjects, two trials each, each subject at another pace.
 SUBJECTS = np.repeat(np.arange(6), 2)
 TRAINING = [
     movement(50 + 4 * person + trial, 0.85 + 0.06 * person, 1 + 0.05 * (trial - person / 3))
@@ -86,40 +86,38 @@ def pipe():
 def test_planted_patterns_are_found():
     pattern = movement(60)
     take = take_of({40: pattern, 100: pattern, 250: movement(45, 1.1), 350: movement(80)}, noise=0)
-    performances, locations = find_performances(pattern, take)
+    trials, locations = find_trials(pattern, take)
     np.testing.assert_allclose(
         spans(locations), [[40, 100], [100, 160], [250, 295], [350, 430]], atol=2
     )
     assert spans(locations)[0] == [40, 100]
     assert locations["score"].between(0.9, 1).all()
-    for part, (start, stop) in zip(performances, spans(locations), strict=True):
+    for part, (start, stop) in zip(trials, spans(locations), strict=True):
         np.testing.assert_array_equal(part, take[start:stop])
 
 
-def test_adjacent_performances_are_found_and_other_movements_are_not(pipe):
-    _, locations = find_performances(pipe, TAKE)
+def test_adjacent_trials_are_found_and_other_movements_are_not(pipe):
+    _, locations = find_trials(pipe, TAKE)
     np.testing.assert_allclose(spans(locations), TRUE, atol=6)
     assert (locations["score"] >= locations["threshold"]).all()
-    assert spans(find_performances(pipe, take_of({100: other(60), 300: other(90)}))[1]) == []
+    assert spans(find_trials(pipe, take_of({100: other(60), 300: other(90)}))[1]) == []
 
 
 def test_pipeline_detector_and_synchronizer_find_the_same(pipe):
     detector = ActionDetector(pipe).fit(TRAINING, groups=SUBJECTS)
-    expected = find_performances(pipe, TAKE)[1]
+    expected = find_trials(pipe, TAKE)[1]
     labels = pd.Series(SUBJECTS, index=np.arange(len(SUBJECTS)) + 7)
     for estimator, groups in ((detector, None), (pipe[0], SUBJECTS), (pipe[0], labels)):
-        pd.testing.assert_frame_equal(
-            find_performances(estimator, TAKE, groups=groups)[1], expected
-        )
+        pd.testing.assert_frame_equal(find_trials(estimator, TAKE, groups=groups)[1], expected)
     linear = LinearSynchronizer(40).fit(TRAINING)
-    found = spans(find_performances(linear, TAKE, groups=SUBJECTS)[1])
+    found = spans(find_trials(linear, TAKE, groups=SUBJECTS)[1])
     np.testing.assert_allclose(found, TRUE, atol=8)
 
 
 def test_best_window_is_that_of_an_exhaustive_search():
     pattern, shortest, longest = movement(12), 8, 18
     take = take_of({15: movement(13)}, 45, noise=0.1)
-    _, locations = find_performances(pattern, take, threshold=None, max_hits=1)
+    _, locations = find_trials(pattern, take, threshold=None, max_hits=1)
     scores = {
         (start, start + n): np.exp(-brute_unlikeness(take[start : start + n], pattern))
         for n in range(shortest, longest + 1)
@@ -147,7 +145,7 @@ def brute_unlikeness(window, pattern, n=None):
         ratios.append((np.square(a - b).sum() + more) / (np.square(a).sum() + np.square(b).sum()))
     energy = np.log(np.square(views[0][0]).sum() / np.square(views[0][1]).sum())
     length = np.log(len(window) / given)
-    # A single performance: the usual variance 0.07 counts like three, the own one is 0.
+    # A single trial: the usual variance 0.07 counts like three, the own one is 0.
     return np.mean(ratios) * np.exp(min(0.05 * (energy**2 + length**2) / (0.07 * 3 / 4), 3))
 
 
@@ -242,7 +240,7 @@ def test_proposals_are_the_best_paths_of_their_portions():
 
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 def test_sitting_down_is_found_in_recordings_of_a_new_actor(real_data):
-    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    bunch = load_trials(real_data / "utkinect" / "utkinect_positions.npz")
     file = np.load(real_data / "utkinect" / "utkinect_takes.npz")
     teach = np.flatnonzero((bunch.target == "sitDown") & ~np.isin(bunch.actor, ["s10"]))
     pipe = make_pipeline(
@@ -253,7 +251,7 @@ def test_sitting_down_is_found_in_recordings_of_a_new_actor(real_data):
     ).fit([bunch.data[i] for i in teach], actionmodel__groups=bunch.actor[teach])
     searched = np.flatnonzero(np.isin(file["actor"], ["s10"]))
     frames = np.split(file["positions"].reshape(len(file["positions"]), -1), file["offsets"][1:-1])
-    _, locations = find_performances(pipe, [frames[i] for i in searched])
+    _, locations = find_trials(pipe, [frames[i] for i in searched])
     true = {
         int(take): (start, stop)
         for take, label, start, stop in zip(
@@ -273,15 +271,15 @@ def test_sitting_down_is_found_in_recordings_of_a_new_actor(real_data):
 
 
 def test_every_kind_of_collection_gives_equal_results(pipe):
-    expected = find_performances(pipe, TAKE)[1]
+    expected = find_trials(pipe, TAKE)[1]
     stacked = np.stack([TAKE, TAKE])
     several = np.empty(2, dtype=object)
     several[:] = [TAKE, TAKE[:350]]
     row = np.sin(np.linspace(0, 9, 50))
     take = np.concatenate([np.zeros(70), row, np.full(60, row[-1])])
-    assert spans(find_performances(row, take, max_hits=1)[1]) == [[70, 120]]
+    assert spans(find_trials(row, take, max_hits=1)[1]) == [[70, 120]]
     for takes in (stacked, [TAKE, TAKE], several):
-        locations = find_performances(pipe, takes)[1]
+        locations = find_trials(pipe, takes)[1]
         first = locations[locations["take"] == 0]
         pd.testing.assert_frame_equal(first, expected)
         assert len(locations) == len(expected) + 3 - (takes is several)
@@ -291,26 +289,26 @@ def test_tables_keep_names_and_float32_stays_float32(pipe):
     table = pd.DataFrame(TAKE, columns=["hip", "knee", "ankle"])
     named = [table.iloc[:250], table]
     sync = DenseSynchronizer(40).fit([pd.DataFrame(x, columns=table.columns) for x in TRAINING])
-    performances, locations = find_performances(sync, pd.concat(named, keys=["ann", "bob"]))
+    trials, locations = find_trials(sync, pd.concat(named, keys=["ann", "bob"]))
     assert locations["take"].tolist() == ["ann"] * 2 + ["bob"] * 3
-    assert performances[4].attrs["performance"] == ("bob", 2)
-    assert list(performances[0].columns) == ["hip", "knee", "ankle"]
-    turned = find_performances(sync, table[["knee", "hip", "ankle"]])[1]
+    assert trials[4].attrs["trial"] == ("bob", 2)
+    assert list(trials[0].columns) == ["hip", "knee", "ankle"]
+    turned = find_trials(sync, table[["knee", "hip", "ankle"]])[1]
     assert spans(turned) == spans(locations[locations["take"] == "bob"])
     with pytest.raises(ValueError, match="names"):
-        find_performances(sync, table.rename(columns={"hip": "chest"}))
-    single, there = find_performances(pipe, TAKE.astype(np.float32))
+        find_trials(sync, table.rename(columns={"hip": "chest"}))
+    single, there = find_trials(pipe, TAKE.astype(np.float32))
     assert {part.dtype for part in single} == {np.dtype(np.float32)}
-    assert spans(there) == spans(find_performances(pipe, TAKE)[1])
+    assert spans(there) == spans(find_trials(pipe, TAKE)[1])
 
 
 def test_unit_does_not_matter_and_input_is_not_changed(pipe):
-    expected = spans(find_performances(pipe, TAKE)[1])
+    expected = spans(find_trials(pipe, TAKE)[1])
     large = TAKE * 2.0**20
     large.setflags(write=False)
     sync = DenseSynchronizer(40).fit([x * 2.0**20 for x in TRAINING])
     before = sorted(vars(sync))
-    assert spans(find_performances(sync, large, groups=SUBJECTS)[1]) == expected
+    assert spans(find_trials(sync, large, groups=SUBJECTS)[1]) == expected
     assert sorted(vars(sync)) == before
 
 
@@ -318,8 +316,8 @@ def test_unit_does_not_matter_and_input_is_not_changed(pipe):
 def test_takes_without_the_action_give_no_hits(pipe, take):
     for pattern in (pipe, movement(60)):
         rates = {"frame_rate": 30, "pattern_rate": 30}
-        performances, locations = find_performances(pattern, take, **rates)
-        assert performances == []
+        trials, locations = find_trials(pattern, take, **rates)
+        assert trials == []
         assert list(locations.columns) == COLUMNS
         assert locations[["start", "stop"]].dtypes.tolist() == [np.dtype(int)] * 2
 
@@ -350,75 +348,71 @@ def at_30():
 @pytest.mark.parametrize("rate", [7.5, 29.97, 120])
 def test_takes_of_another_frame_rate_are_resampled(at_30, rate):
     take = table(TAKE, rate)
-    performances, locations = find_performances(at_30, take)
+    trials, locations = find_trials(at_30, take)
     np.testing.assert_allclose(np.array(spans(locations)) * 30 / rate, TRUE, atol=6)
     assert (locations["stop"].to_numpy()[:-1] <= locations["start"].to_numpy()[1:]).all()
-    for part, (start, stop) in zip(performances, spans(locations), strict=True):
+    for part, (start, stop) in zip(trials, spans(locations), strict=True):
         np.testing.assert_array_equal(part, take.iloc[start:stop])
         assert part.attrs["frame_rate"] == rate
     by_index = table(TAKE, rate).set_axis(pd.Index(np.arange(len(take)) / rate, name="time"))
     by_index.attrs.clear()
-    pd.testing.assert_frame_equal(find_performances(at_30, by_index)[1], locations)
-    together = find_performances(at_30, [table(TAKE, 30), take])[1]
+    pd.testing.assert_frame_equal(find_trials(at_30, by_index)[1], locations)
+    together = find_trials(at_30, [table(TAKE, 30), take])[1]
     own = together[together["take"] == 1].assign(take=0).reset_index(drop=True)
     pd.testing.assert_frame_equal(own, locations)
 
 
 def test_patterns_have_frame_rates(at_30):
     take, pattern = table(TAKE, 120), table(movement(60), 30)
-    found = np.array(spans(find_performances(pattern, take)[1]))
+    found = np.array(spans(find_trials(pattern, take)[1]))
     np.testing.assert_allclose(found / 4, TRUE, atol=6)
-    assert spans(find_performances(at_30, table(TAKE[:2], 120).iloc[:3])[1]) == []
-    assert spans(find_performances(at_30, table(other(300), 7.5))[1]) == []
+    assert spans(find_trials(at_30, table(TAKE[:2], 120).iloc[:3])[1]) == []
+    assert spans(find_trials(at_30, table(other(300), 7.5))[1]) == []
 
 
 def test_warns_if_one_frame_rate_only_is_known(pipe, at_30):
-    with pytest.warns(
-        UserWarning, match=r"Performance 1 has no known .* the pattern has 30 frames"
-    ):
-        assert len(find_performances(at_30, [table(TAKE, 30), table(TAKE)])[1]) == 6
+    with pytest.warns(UserWarning, match=r"Trial 1 has no known .* the pattern has 30 frames"):
+        assert len(find_trials(at_30, [table(TAKE, 30), table(TAKE)])[1]) == 6
     sync = DenseSynchronizer(40).fit([table(x) for x in TRAINING])
-    with pytest.warns(
-        UserWarning, match=r"The pattern has no known .* performance 0 has 60 frames"
-    ):
-        find_performances(sync, table(TAKE, 60))
+    with pytest.warns(UserWarning, match=r"The pattern has no known .* trial 0 has 60 frames"):
+        find_trials(sync, table(TAKE, 60))
     for rate in (0.2, 4000):
-        with pytest.raises(ValueError, match=rf"Performance 0 has {rate} frames .* the pattern 30"):
-            find_performances(at_30, attributed(table(TAKE), frame_rate=rate))
-    with pytest.warns(UserWarning, match="Performance 1 has 60 frames"):
+        with pytest.raises(ValueError, match=rf"Trial 0 has {rate} frames .* the pattern 30"):
+            find_trials(at_30, attributed(table(TAKE), frame_rate=rate))
+    with pytest.warns(UserWarning, match="Trial 1 has 60 frames"):
         sync = DenseSynchronizer(40).fit([table(TRAINING[0], 30), table(TRAINING[1], 60)])
     with pytest.warns(UserWarning, match="The pattern has no known"):
-        find_performances(sync, table(TAKE, 60))
+        find_trials(sync, table(TAKE, 60))
 
 
 def test_rates_may_be_given(pipe, at_30):
     rate = 60
-    expected = find_performances(at_30, table(TAKE, rate))[1]
+    expected = find_trials(at_30, table(TAKE, rate))[1]
     arrays = [table(TAKE, rate).to_numpy(), TAKE]
-    parts, found = find_performances(pipe, arrays, frame_rate=[rate, 30], pattern_rate=30)
+    parts, found = find_trials(pipe, arrays, frame_rate=[rate, 30], pattern_rate=30)
     assert spans(found[found["take"] == 0]) == spans(expected)
     np.testing.assert_allclose(spans(found[found["take"] == 1]), TRUE, atol=8)
     np.testing.assert_array_equal(parts[0], arrays[0][slice(*spans(found)[0])])
     # What is given goes before what tables tell.
     wrong = attributed(table(TAKE, rate), frame_rate=29)
-    found = find_performances(at_30, wrong, frame_rate=rate)[1]
+    found = find_trials(at_30, wrong, frame_rate=rate)[1]
     assert spans(found) == spans(expected)
-    found = find_performances(TRAINING[0], arrays[0], frame_rate=rate, pattern_rate=30)[1]
+    found = find_trials(TRAINING[0], arrays[0], frame_rate=rate, pattern_rate=30)[1]
     assert len(found) == 3
 
 
 def test_warns_of_another_frame_rate_if_none_is_known_and_nothing_is_found(pipe):
     take = table(TAKE, 120).to_numpy()
     with pytest.warns(UserWarning, match=r"No window .* at 4 times the pattern's rate 3 would"):
-        assert find_performances(pipe, take)[0] == []
+        assert find_trials(pipe, take)[0] == []
     # What is known is not doubted.
-    assert find_performances(pipe, take, frame_rate=30, pattern_rate=30)[0] == []
+    assert find_trials(pipe, take, frame_rate=30, pattern_rate=30)[0] == []
 
 
 def test_rates_within_a_hundredth_are_one(at_30):
     take = table(TAKE, 30)
-    expected = find_performances(at_30, take)[1]
-    found = find_performances(at_30, attributed(take.copy(), frame_rate=29.97))[1]
+    expected = find_trials(at_30, take)[1]
+    found = find_trials(at_30, attributed(take.copy(), frame_rate=29.97))[1]
     pd.testing.assert_frame_equal(found, expected)
 
 
@@ -442,16 +436,16 @@ def test_hits_in_frames_given_keep_order_and_limits():
 
 
 def test_threshold_and_max_hits_select_hits(pipe):
-    locations = find_performances(pipe, TAKE, threshold=None)[1]
+    locations = find_trials(pipe, TAKE, threshold=None)[1]
     assert len(locations) > 3
     lengths = [len(x) for x in TRAINING]
     sizes = locations["stop"] - locations["start"]
     assert sizes.between(min(lengths) / 1.1 - 1, np.ceil(max(lengths) * 1.1)).all()
     assert (locations["stop"].to_numpy()[:-1] <= locations["start"].to_numpy()[1:]).all()
-    best = find_performances(pipe, TAKE, threshold=None, max_hits=2)[1]
+    best = find_trials(pipe, TAKE, threshold=None, max_hits=2)[1]
     assert sorted(best["score"]) == sorted(locations["score"])[-2:]
     level = float(locations["score"].nlargest(2).min())
-    assert len(find_performances(pipe, TAKE, threshold=level)[1]) == 2
+    assert len(find_trials(pipe, TAKE, threshold=level)[1]) == 2
 
 
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
@@ -460,16 +454,15 @@ def test_auto_threshold_falls_with_coverage():
     noisy = [x + 0.3 * rng.standard_normal(x.shape) for x in TRAINING]
     sync = DenseSynchronizer(40).fit(noisy)
     origins = [
-        find_performances(sync, noisy, coverage=share, groups=SUBJECTS)[1]
-        for share in (0.3, 0.7, 0.95)
+        find_trials(sync, noisy, coverage=share, groups=SUBJECTS)[1] for share in (0.3, 0.7, 0.95)
     ]
     thresholds = [locations["threshold"].iloc[0] for locations in origins]
     assert 0.87 > thresholds[0] > thresholds[1] > thresholds[2] > 0.5
     assert all((locations["score"] >= locations["threshold"]).all() for locations in origins)
-    # The model knows the groups; by themselves performances of a subject resemble each other.
+    # The model knows the groups; by themselves trials of a subject resemble each other.
     model = ActionModel().fit(sync.transform(noisy), groups=SUBJECTS)
     for pattern, equal in ((make_pipeline(sync, model), True), (sync, False)):
-        found = find_performances(pattern, noisy, coverage=0.7)[1]["threshold"].iloc[0]
+        found = find_trials(pattern, noisy, coverage=0.7)[1]["threshold"].iloc[0]
         assert (found == thresholds[1]) == equal
 
 
@@ -522,7 +515,7 @@ def test_threshold_of_a_take_rejects_a_crowd_and_lies_in_gaps():
             best = max(value(level, hits, n) for level in np.linspace(0.1, limit, 600))
             assert value(found, hits, n) == pytest.approx(best, abs=0.01)
             assert found < limit or n > 1
-    # Of a single performance nothing is known.
+    # Of a single trial nothing is known.
     alone = WindowDissimilarity(DenseSynchronizer(40, pattern=0).fit(TRAINING[:1]))
     assert alone.threshold_of_take(0.5, np.linspace(0.1, 0.5, 99), 900) == 0.5
 
@@ -532,12 +525,12 @@ def test_threshold_of_a_take_is_that_of_the_take():
     rng = np.random.default_rng(0)
     pipe = DenseSynchronizer(40).fit([x + 0.3 * rng.standard_normal(x.shape) for x in TRAINING])
     crowd = take_of({k: movement(60, 0.7 + k / 1500) for k in range(0, 900, 65)}, 960, 0.4)
-    _, both = find_performances(pipe, [TAKE, crowd], threshold=None)
+    _, both = find_trials(pipe, [TAKE, crowd], threshold=None)
     for i, take in enumerate((TAKE, crowd)):
-        alone = find_performances(pipe, take, threshold=None)[1]
+        alone = find_trials(pipe, take, threshold=None)[1]
         own = both[both["take"] == i].assign(take=0).reset_index(drop=True)
         pd.testing.assert_frame_equal(own, alone)
-        auto = find_performances(pipe, take)[1]
+        auto = find_trials(pipe, take)[1]
         kept = alone[alone["score"] >= alone["threshold"]]
         assert auto.to_numpy().tolist() == kept.to_numpy().tolist()
     assert both.groupby("take")["threshold"].nunique().tolist() == [1, 1]
@@ -545,18 +538,18 @@ def test_threshold_of_a_take_is_that_of_the_take():
 
 
 def test_progress_is_printed_to_the_end(pipe, capsys):
-    find_performances(pipe, [TAKE, 0 * TAKE], verbose=1)
+    find_trials(pipe, [TAKE, 0 * TAKE], verbose=1)
     (line,) = capsys.readouterr().out.splitlines()
-    assert line.startswith("[find_performances] searching: 100 %")
+    assert line.startswith("[find_trials] searching: 100 %")
 
 
-def test_auto_threshold_of_performances_that_share_nothing_is_at_most_half_of_all_scores():
+def test_auto_threshold_of_trials_that_share_nothing_is_at_most_half_of_all_scores():
     noise = list(np.random.default_rng(0).standard_normal((12, 40, 30)))
     dissimilarity = WindowDissimilarity(DenseSynchronizer(40, metric=None).fit(noise))
     assert dissimilarity.threshold(0.95) == 0.7
 
 
-def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postures():
+def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_poses():
     positions = np.random.default_rng(0).standard_normal((30, 50, 3)) * [3, 1, 0] + [5, 0, 7]
     (some,) = random_movements(positions, [2000])
     frames = some.reshape(-1, 3)
@@ -576,26 +569,26 @@ def test_large_training_sets_are_subsampled():
     assert len(sync.examples_) == 64
     assert len(sync.lengths_) == 70
     groups = [f"subject {i // 8}" for i in range(70)]
-    _, locations = find_performances(sync, TAKE[:130], groups=groups)
+    _, locations = find_trials(sync, TAKE[:130], groups=groups)
     np.testing.assert_allclose(spans(locations), TRUE[:1], atol=8)
     pipe = make_pipeline(sync, ActionModel()).fit(many, actionmodel__groups=groups)
     with pytest.warns(UserWarning, match="groups of 64 of 70 .* Give groups"):
-        find_performances(pipe, TAKE[:60])
+        find_trials(pipe, TAKE[:60])
 
 
-def test_warns_if_the_model_was_updated_with_other_performances():
+def test_warns_if_the_model_was_updated_with_other_trials():
     many = [movement(30 + i, 0.9 + i / 20, 1) for i in range(6)]
     sync = LinearSynchronizer(30).fit(many)
     model = ActionModel().fit(sync.transform(many[:4]), groups=[0, 0, 1, 1])
     model.partial_fit(sync.transform(many[2:]), groups=[0, 0, 1, 1])
     with pytest.warns(UserWarning, match="groups of 8 of 8 .* fitted on 6: .* Give groups"):
-        find_performances(make_pipeline(sync, model), TAKE[:60])
+        find_trials(make_pipeline(sync, model), TAKE[:60])
 
 
 def test_memory_does_not_grow_with_the_take(pipe):
     take = np.concatenate([TAKE] * 12)
     tracemalloc.start()
-    _, locations = find_performances(pipe, take)
+    _, locations = find_trials(pipe, take)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(locations) >= 36
@@ -619,32 +612,32 @@ def test_memory_does_not_grow_with_the_take(pipe):
 )
 def test_refuses_invalid_parameters(pipe, given, message):
     with pytest.raises(ValueError, match=message):
-        find_performances(pipe, TAKE, **given)
+        find_trials(pipe, TAKE, **given)
 
 
 def test_refuses_invalid_takes_and_patterns(pipe):
     gap = TAKE.copy()
     gap[7, 1] = np.nan
-    with pytest.raises(ValueError, match=r"Performance 1.*frame 7"):
-        find_performances(pipe, [TAKE, gap])
+    with pytest.raises(ValueError, match=r"Trial 1.*frame 7"):
+        find_trials(pipe, [TAKE, gap])
     with pytest.raises(ValueError, match="2 features"):
-        find_performances(pipe, TAKE[:, :2])
+        find_trials(pipe, TAKE[:, :2])
     with pytest.raises(ValueError, match="at least 2 frames"):
-        find_performances(pipe, TAKE[:1])
-    with pytest.raises(ValueError, match="give one performance"):
-        find_performances(movement(2), TAKE)
+        find_trials(pipe, TAKE[:1])
+    with pytest.raises(ValueError, match="give one trial"):
+        find_trials(movement(2), TAKE)
     with pytest.raises(ValueError, match="an array has none"):
-        find_performances(movement(60), TAKE, groups=[1])
+        find_trials(movement(60), TAKE, groups=[1])
     with pytest.raises(ValueError, match="The pattern, frame 7"):
-        find_performances(gap, TAKE)
+        find_trials(gap, TAKE)
     with pytest.raises(ValueError, match="fit a synchronizer to all"):
-        find_performances(TRAINING, TAKE)
+        find_trials(TRAINING, TAKE)
     rows = DenseSynchronizer().fit(np.stack([TAKE[:60, 0], TAKE[60:120, 0]]))
     with pytest.raises(ValueError, match="rows of a 2-D array"):
-        find_performances(rows, TAKE[:, 0])
+        find_trials(rows, TAKE[:, 0])
     with pytest.raises(ValueError, match="The pattern does not move"):
-        find_performances(np.ones((30, 3)), np.ones((90, 3)))
+        find_trials(np.ones((30, 3)), np.ones((90, 3)))
     with pytest.raises(NotFittedError):
-        find_performances(DenseSynchronizer(), TAKE)
+        find_trials(DenseSynchronizer(), TAKE)
     with pytest.raises(ValueError, match="no synchronizer"):
-        find_performances(ASpace().fit(TRAINING), TAKE)
+        find_trials(ASpace().fit(TRAINING), TAKE)

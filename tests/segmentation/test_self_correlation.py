@@ -34,9 +34,9 @@ def test_correlation_is_that_of_the_formula():
     assert len(found.correlation) == 0.7 * 150 + 1
     velocity = np.gradient(x, axis=0)
     for lag in (0, 1, 17, 37, 60, 104):
-        assert found.posture[lag] == pytest.approx(by_the_formula(x, lag), abs=0.01)
+        assert found.pose[lag] == pytest.approx(by_the_formula(x, lag), abs=0.01)
         assert found.velocity[lag] == pytest.approx(by_the_formula(velocity, lag), abs=0.04)
-    np.testing.assert_array_equal(found.correlation, (found.posture + found.velocity) / 2)
+    np.testing.assert_array_equal(found.correlation, (found.pose + found.velocity) / 2)
 
 
 @pytest.mark.parametrize("drift", [0.0, 3.0, 40.0])
@@ -47,7 +47,7 @@ def test_correlation_of_a_drifting_curve_is_pearsons_at_every_lag(drift):
     found = self_correlation(x[:, np.newaxis])
     change, bend = (np.square(np.diff(x, k)).mean() for k in (1, 2))
     width = np.sqrt(x.var() / (change - bend / 3)) / 4
-    for order, correlation in enumerate((found.posture, found.velocity)):
+    for order, correlation in enumerate((found.pose, found.velocity)):
         y = oracle.slow_filter(x[:, np.newaxis], width, order)[:, 0]
         expected = [np.corrcoef(y[: 400 - lag], y[lag:])[0, 1] for lag in range(len(correlation))]
         np.testing.assert_allclose(correlation, expected, atol=1e-5)
@@ -95,7 +95,7 @@ def test_strength_is_robust_to_white_noise(size, lost):
 
 
 def test_peaks_are_positive_maxima_after_a_fall():
-    """Below half their height, of the postures; ripples on the way down are none."""
+    """Below half their height, of the poses; ripples on the way down are none."""
     noise = np.random.default_rng(3).normal(size=(300, 2))
     ripple = np.sin(np.arange(300)[:, np.newaxis] / 1.7 + np.arange(2))
     left_out = 0
@@ -104,7 +104,7 @@ def test_peaks_are_positive_maxima_after_a_fall():
         r, expected = found.correlation, []
         for lag in range(1, len(r) - 1):
             if r[lag - 1] < r[lag] >= r[lag + 1]:
-                fallen = min(found.posture[: lag + 1]) < 0.5 * r[lag]
+                fallen = min(found.pose[: lag + 1]) < 0.5 * r[lag]
                 expected += [lag] if r[lag] > 0 and fallen else []
                 left_out += not (r[lag] > 0 and fallen)
         assert found.peaks.tolist() == expected
@@ -166,9 +166,9 @@ def test_path_of_the_body_does_not_change_the_period():
         (np.zeros(5), r"shape \(5,\)"),
         (np.zeros((1, 3)), "at least 2 frames"),
         (np.full((9, 2), np.nan), "NaN"),
-        (np.zeros((2, 9, 2)), "Give one take, .* got 2 performances"),
-        ([np.zeros((9, 2)), np.zeros((7, 2))], "got 2 performances; for several"),
-        (to_frame([np.zeros((9, 2)), np.ones((7, 2))]), "got 2 performances"),
+        (np.zeros((2, 9, 2)), "Give one take, .* got 2 trials"),
+        ([np.zeros((9, 2)), np.zeros((7, 2))], "got 2 trials; for several"),
+        (to_frame([np.zeros((9, 2)), np.ones((7, 2))]), "got 2 trials"),
         ([["a"], ["b"]], "numeric"),
     ],
 )
@@ -190,7 +190,7 @@ def test_noise_in_few_features_is_rejected():
     assert rejection_reason(correlate(one), 0.4) == ""
 
 
-def test_breadth_is_that_of_postures():
+def test_breadth_is_that_of_poses():
     t = 2 * np.pi * np.arange(1000) / 200
     # Velocities have the variances 1 and 4.
     found = self_correlation(np.column_stack([np.sin(t), np.sin(2 * t)]))

@@ -15,7 +15,7 @@ def waves(n_frames, period, first=0):
 
 
 def standing(n_frames, seed=0, size=0.02):
-    """A posture that sways slowly."""
+    """A pose that sways slowly."""
     noise = np.random.default_rng(seed).normal(size=(n_frames, 3))
     slow = gaussian_filter1d(noise, 10, axis=0)
     return np.array([0.3, -0.8, 0.5]) + size * (slow / slow.std() + 0.2 * noise)
@@ -71,7 +71,7 @@ def test_several_stretches_are_numbered_and_counted_on():
     assert repr(display).endswith(f"{len(whole)} whole cycles)")
 
 
-def test_only_what_follows_the_template_is_complete():
+def test_only_what_follows_the_pattern_is_complete():
     """Another movement repeats for a while; the fit leaves it out, and so does segment."""
     t = 2 * np.pi * np.arange(150)[:, np.newaxis] / 50
     other = np.sin(t + 2 * np.pi / 3 * np.array([0, 2, 1]) + 0.5)
@@ -83,7 +83,7 @@ def test_only_what_follows_the_template_is_complete():
     assert table.loc[table["complete"], "stretch"].unique().tolist() == [0]
     assert table.loc[table["stretch"] == 1, "score"].max() < 0.5
     alone = CycleSegmenter(start=0).fit([x[: places(x)[0][1]], X[1]])
-    assert np.vdot(segmenter.template_, alone.template_) > 0.99 * np.square(alone.template_).sum()
+    assert np.vdot(segmenter.pattern_, alone.pattern_) > 0.99 * np.square(alone.pattern_).sum()
     np.testing.assert_allclose(segmenter.periods_, 60, rtol=0.01)
     assert segmenter.set_params(incomplete=False).segment([x])[1]["complete"].all()
 
@@ -94,7 +94,7 @@ def test_a_fit_learns_from_stretches_only():
     segmenters = [CycleSegmenter(start=0).fit([x]) for x in (walk, around)]
     np.testing.assert_allclose(segmenters[1].periods_, segmenters[0].periods_, rtol=0.01)
     # The two maxima of the feature are nearly equal: either may begin the cycle.
-    one, other = (s.template_ / np.linalg.norm(s.template_) for s in segmenters)
+    one, other = (s.pattern_ / np.linalg.norm(s.pattern_) for s in segmenters)
     assert max(np.vdot(one, np.roll(other, k, axis=0)) for k in range(32)) > 0.99
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.matching.costs import COSTS, step_table
 from sklearn_motionsync.matching.matcher import cost_features
 from sklearn_motionsync.matching.trellis import Trellis
@@ -24,7 +24,7 @@ def test_paper_settings_equal_all_admissible_paths(pattern):
     sync = DenseSynchronizer.paper(pattern=pattern, smoothness=0.2, max_offset=0.5).fit(X)
     mu = 0.2 * np.square(X - X.mean(axis=(0, 1))).sum(axis=2).mean()
     np.testing.assert_allclose(sync.mu_, mu)
-    settings = step_costs("posture", 2, 1), mu, 1, 3
+    settings = step_costs("pose", 2, 1), mu, 1, 3
     if pattern == "median":
         sums = [sum(brute_force(x, y, *settings)[0] for y in X) for x in X]
         np.testing.assert_allclose(sync.global_distances_, sums, rtol=1e-10)
@@ -115,7 +115,7 @@ EVENTS = {
 
 @pytest.fixture(scope="module")
 def times_of():
-    """Times of all performances on the clock of each of them: found once for all joints."""
+    """Times of all trials on the clock of each of them: found once for all joints."""
     known = {}
 
     def times(action, settings, X, skeleton):
@@ -134,7 +134,7 @@ def times_of():
 def test_key_moment_errors_of_real_people(event, real_data, times_of):
     action, joint, extreme = event[:3]
     (peer_mean, peer_median), (share, most), settings = EVENTS[event]
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action]
     height = [x[:, 3 * bunch.joints.index(joint) + 1].astype(float) for x in X]
     moments = np.array(
@@ -149,8 +149,8 @@ def test_key_moment_errors_of_real_people(event, real_data, times_of):
 
 
 def test_warps_hardly_depend_on_being_in_the_training_set(bends):
-    postures = DirectionCosines(bends.skeleton).fit_transform(bends.data)
-    X = ASpace(12).fit_transform(postures)
+    poses = DirectionCosines(bends.skeleton).fit_transform(bends.data)
+    X = ASpace(12).fit_transform(poses)
     sync = DenseSynchronizer(P).fit(X)
     copies = sync.match([x.copy() for x in X])
     np.testing.assert_array_equal(copies.times, sync.match(X).times)

@@ -1,4 +1,4 @@
-"""A warp depends on its performance and the fitted synchronizer only, also where costs tie."""
+"""A warp depends on its trial and the fitted synchronizer only, also where costs tie."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.matching.costs import COSTS, step_table
 from sklearn_motionsync.matching.trellis import Trellis
 
-PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
+PAPER = {"cost": "pose", "max_rate": 2, "consensus": 0}
 SETTINGS = {
     "no metric": {"metric": None},
     "paper": PAPER,
@@ -98,9 +98,9 @@ def test_ties_go_to_the_first_entry_of_the_step_table(cost, n_others):
 
 def test_small_differences_decide():
     rng = np.random.default_rng(1)
-    postures = rng.standard_normal((1, 25, 4)).repeat(2, axis=1)
-    moving = postures.copy()
-    moving[:, 1::2] += 1e-4  # the second of two like postures is the one of the base
-    trellis = Trellis(step_table("posture", max_rate=2), 0.0, 5)
-    q = trellis.paths(postures + 1e-4, moving)[0, 0] + np.arange(50)
+    poses = rng.standard_normal((1, 25, 4)).repeat(2, axis=1)
+    moving = poses.copy()
+    moving[:, 1::2] += 1e-4  # the second of two like poses is the one of the base
+    trellis = Trellis(step_table("pose", max_rate=2), 0.0, 5)
+    q = trellis.paths(poses + 1e-4, moving)[0, 0] + np.arange(50)
     assert (q[1:] % 2 == 1).all()

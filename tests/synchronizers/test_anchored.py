@@ -20,8 +20,8 @@ P = 60
 @pytest.fixture(scope="module")
 def bunch():
     bunch = make_bending(9, random_state=0)
-    postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-    bunch.data = ASpace(3).fit_transform(postures)
+    poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    bunch.data = ASpace(3).fit_transform(poses)
     return bunch
 
 
@@ -30,7 +30,7 @@ def shares(bunch, keyframes):
 
 
 def at_keyframes(sync, match):
-    """The times, as shares, at which performances meet the key-frames of the pattern."""
+    """The times, as shares, at which trials meet the key-frames of the pattern."""
     frames = np.arange(match.times.shape[1])
     return np.array([np.interp(sync.keyframes_, frames, t) for t in match.times]) / frames[-1]
 
@@ -198,7 +198,7 @@ def test_the_live_synchronizer_learns_from_keyframes(bunch):
     assert live.track(bunch.data[:1])[0].phase[-1] > 0.8 * (P - 1)
 
 
-def test_rows_of_a_table_are_those_of_the_performances(bunch):
+def test_rows_of_a_table_are_those_of_the_trials(bunch):
     names = [f"trial {i}" for i in range(9)]
     X = pd.concat([pd.DataFrame(x) for x in bunch.data], keys=names)
     K = pd.DataFrame(bunch.keyframes[:, [2]], index=names)
@@ -211,13 +211,13 @@ def test_rows_of_a_table_are_those_of_the_performances(bunch):
 
 BAD = {
     "too few rows": (lambda K: K[:4], "list of 9 arrays"),
-    "another count": (lambda K: [*K[:3], [5.0], *K[4:]], "Performance 3: .* 2 increasing"),
-    "falling": (lambda K: [*K[:2], K[2][::-1], *K[3:]], "Performance 2: .* increasing"),
-    "outside": (lambda K: [*K[:8], [10.0, 1e4]], "Performance 8: .* between 0 and"),
-    "in seconds": (lambda K: K / 1000, "Performance 0: .* look like seconds"),
-    "none known": (lambda K: K * [1, np.nan], "key-frame 1 is known in no performance"),
+    "another count": (lambda K: [*K[:3], [5.0], *K[4:]], "Trial 3: .* 2 increasing"),
+    "falling": (lambda K: [*K[:2], K[2][::-1], *K[3:]], "Trial 2: .* increasing"),
+    "outside": (lambda K: [*K[:8], [10.0, 1e4]], "Trial 8: .* between 0 and"),
+    "in seconds": (lambda K: K / 1000, "Trial 0: .* look like seconds"),
+    "none known": (lambda K: K * [1, np.nan], "key-frame 1 is known in no trial"),
     "no column": (lambda K: K[:, :0], "must be some increasing frames"),
-    "no row": (lambda K: [None] * 9, "a key-frame is known in no performance"),
+    "no row": (lambda K: [None] * 9, "a key-frame is known in no trial"),
 }
 
 

@@ -8,14 +8,14 @@ import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, FrameWise, Skeleton
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.synchronizers import training
 
 SETTINGS = [
     {},
     {"metric": None},
     {"cost": "elastic"},
-    {"cost": "posture", "max_rate": 2, "consensus": 0},
+    {"cost": "pose", "max_rate": 2, "consensus": 0},
 ]
 
 
@@ -68,7 +68,7 @@ def test_warning_does_not_depend_on_batches(monkeypatch):
 
 @pytest.mark.parametrize("name", ["hdm05", "utkinect"])
 def test_no_warning_for_recordings_and_principal_components(name, real_data):
-    bunch = load_performances(real_data / name / f"{name}_positions.npz")
+    bunch = load_trials(real_data / name / f"{name}_positions.npz")
     skeleton = Skeleton.acclaim() if name == "hdm05" else Skeleton.kinect()
     label = {"hdm05": "depositFloorR", "utkinect": "standUp"}.get(name, bunch.target[0])
     X = [x for x, target in zip(bunch.data, bunch.target, strict=True) if target == label][:12]

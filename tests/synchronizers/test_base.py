@@ -57,7 +57,7 @@ def test_subclass_works_in_pipelines_and_displays(bending):
     pipe = make_pipeline(cosines, ASpace(), ShiftSynchronizer(50), ActionModel()).fit(data)
     assert pipe.predict(data).shape == (8,)
     display = SynchronizationDisplay.from_estimator(pipe, data, features=["aspace0"])
-    assert display.titles[1] == f"the template, trial {pipe[2].pattern_index_}"
+    assert display.titles[1] == f"the pattern, trial {pipe[2].pattern_index_}"
     np.testing.assert_array_equal(display.match.times, Match.from_estimator(pipe, data).times)
     assert len(SkeletonDisplay.from_estimator(pipe, data).axes_) == 2
     assert np.isfinite(cross_val_score(pipe[:3], data, cv=2, scoring=SpreadScorer())).all()
@@ -103,21 +103,21 @@ def test_normalize_is_linear_normalisation(estimator, shifted):
     assert estimator(30).fit(rows).normalize(rows).shape == (5, 30, 1)
 
 
-def test_checked_performances_are_not_checked_again(shifted):
+def test_checked_trials_are_not_checked_again(shifted):
     sync = DenseSynchronizer(30).fit(shifted)
-    checked = sync.check_performances(shifted)
-    assert sync.check_performances(checked) is checked
+    checked = sync.check_trials(shifted)
+    assert sync.check_trials(checked) is checked
     assert [len(x) for x in checked] == [81] * 5
     some = sync.match(checked.take([1, 2]))
     np.testing.assert_array_equal(some.times, sync.match(shifted[1:3]).times)
     rows = np.stack([x[:, 0] for x in shifted])
     univariate = DenseSynchronizer(30).fit(rows)
-    some = univariate.match(univariate.check_performances(rows).take(slice(1, 3)))
+    some = univariate.match(univariate.check_trials(rows).take(slice(1, 3)))
     np.testing.assert_array_equal(some.times, univariate.match(rows[1:3]).times)
     np.testing.assert_array_equal(sync.match(checked).times, sync.match(shifted).times)
     # Those checked by another estimator are.
     narrow = LinearSynchronizer().fit([x[:, :2] for x in shifted])
-    with pytest.raises(ValueError, match="Performance 0 has 3 features a frame"):
+    with pytest.raises(ValueError, match="Trial 0 has 3 features a frame"):
         narrow.transform(checked)
 
 

@@ -1,4 +1,4 @@
-"""blend_performances: postures, lengths of limbs, headings, paths, timing, and kinds of input."""
+"""blend_trials: poses, lengths of limbs, headings, paths, timing, and kinds of input."""
 
 import numpy as np
 import pandas as pd
@@ -12,8 +12,8 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     Match,
     Skeleton,
-    blend_performances,
-    to_sequences,
+    blend_trials,
+    to_trials,
 )
 
 import made_bodies
@@ -54,8 +54,8 @@ def walker(n_frames, size=1.0, seed=0):
     (names,) = cosines.transform([standing(2)])
     moves = rng.normal(scale=0.15, size=(2, names.shape[1])) * [[1], [0.5]]
     moves[:, :4] = 0
-    postures = names[:1] + moves[0] * np.sin(6 * t) + moves[1] * np.cos(9 * t)
-    x = cosines.inverse_transform(postures).reshape(n_frames, -1, 3)
+    poses = names[:1] + moves[0] * np.sin(6 * t) + moves[1] * np.cos(9 * t)
+    x = cosines.inverse_transform(poses).reshape(n_frames, -1, 3)
     x[..., 2] += size * 1.5 * t
     return x.reshape(n_frames, -1)
 
@@ -70,9 +70,9 @@ def standing(n_frames):
 
 
 @pytest.mark.parametrize("i", [0, 5, 11])
-def test_weight_of_one_gives_the_performance_back(bending, pipe, i):
+def test_weight_of_one_gives_the_trial_back(bending, pipe, i):
     X = bending.data[:12]
-    found = blend_performances(pipe, X, np.eye(12)[i])
+    found = blend_trials(pipe, X, np.eye(12)[i])
     assert found.shape == X[i].shape
     np.testing.assert_allclose(found, X[i], atol=1e-12)
     cosines = pipe[0]
@@ -88,7 +88,7 @@ def test_weight_of_one_gives_bodies_of_every_format_back(name, n_dims):
     times[:, [0, 1, -1]] = 0, 0, 29
     times[1, 10:14] = times[1, 10]
     for i in (0, 1):
-        found = blend_performances(Match(times), X, {i: 1}, skeleton=skeleton)
+        found = blend_trials(Match(times), X, {i: 1}, skeleton=skeleton)
         np.testing.assert_allclose(found, X[i], atol=1e-9)
 
 
@@ -120,9 +120,9 @@ def test_weight_of_one_gives_incomplete_bodies_back(landmarks):
     skeleton = Skeleton(["a", "b", "c", "d", "e"], [-1, -1, -1, -1, 3], landmarks, up="z")
     X = [np.random.default_rng(s).normal(size=(20 + s, 15)) for s in (0, 1)]
     for i in (0, 1):
-        found = blend_performances(even(*X), X, {i: 1}, skeleton=skeleton)
+        found = blend_trials(even(*X), X, {i: 1}, skeleton=skeleton)
         np.testing.assert_allclose(found, X[i], atol=1e-9)
-    assert np.isfinite(blend_performances(even(*X), X, [0.5, 0.5], skeleton=skeleton)).all()
+    assert np.isfinite(blend_trials(even(*X), X, [0.5, 0.5], skeleton=skeleton)).all()
 
 
 # -- limbs ------------------------------------------------------------------------------------
@@ -131,7 +131,7 @@ def test_weight_of_one_gives_incomplete_bodies_back(landmarks):
 @pytest.mark.parametrize("weights", [[0.5, 0.5], [0.9, 0.1], [1.3, -0.3], [[1, 0], [0, 1]]])
 def test_lengths_of_limbs_are_weighted_means(weights):
     X = [walker(60), walker(80, size=1.3, seed=1)]
-    found = blend_performances(even(*X), X, weights, skeleton=PAPER)
+    found = blend_trials(even(*X), X, weights, skeleton=PAPER)
     own = [lengths_of(x, PAPER)[0] for x in X]
     if np.ndim(weights) == 1:
         weights = np.repeat([weights], len(found), axis=0)
@@ -156,7 +156,7 @@ def test_tilted_hips_and_shoulders_keep_their_width(parents):
             place = body[:, [PAPER.index_of(middle)]]
             body[:, at] = (body[:, at] - place) @ turn.T + place
         X.append(body.reshape(9, -1))
-    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=skeleton).reshape(9, -1, 3)
+    found = blend_trials(even(*X), X, [0.5, 0.5], skeleton=skeleton).reshape(9, -1, 3)
     for part, middle, width in (("hip", "pelvis", 0.2), ("shoulder", "neck", 0.4)):
         left, right = (found[:, PAPER.index_of(f"{s}_{part}")] for s in ("left", "right"))
         np.testing.assert_allclose(np.linalg.norm(left - right, axis=1), width)
@@ -171,7 +171,7 @@ def test_links_that_keep_their_length_do_in_the_blend():
         body = standing(9).reshape(9, -1, 3)
         body[:, PAPER.index_of("pelvis")] += turn @ [0, 0.1, 0]
         X.append(body.reshape(9, -1))
-    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER).reshape(9, -1, 3)
+    found = blend_trials(even(*X), X, [0.5, 0.5], skeleton=PAPER).reshape(9, -1, 3)
     hips = [found[:, PAPER.index_of(f"{side}_hip")] for side in ("left", "right")]
     apart = found[:, PAPER.index_of("pelvis")] - np.mean(hips, axis=0)
     np.testing.assert_allclose(np.linalg.norm(apart, axis=1), 0.1)
@@ -182,7 +182,7 @@ def test_recorded_limbs_do_not_shrink(bends):
     one, other = (int(np.flatnonzero(bends.actor == a)[0]) for a in ("bd", "tr"))
     X = [np.asarray(bends.data[i], dtype=float) for i in (one, other)]
     pipe = make_pipeline(DirectionCosines(bends.skeleton), ASpace(), DenseSynchronizer(n_frames=60))
-    found = blend_performances(pipe.fit(X), X, [0.5, 0.5])
+    found = blend_trials(pipe.fit(X), X, [0.5, 0.5])
     rigid = slice(0, 10)  # thighs, legs, arms, forearms, hips, shoulders
     mean = np.mean([np.median(lengths_of(x, bends.skeleton), axis=0) for x in X], axis=0)
     lengths = lengths_of(found, bends.skeleton)
@@ -199,7 +199,7 @@ def test_recorded_limbs_do_not_shrink(bends):
 )
 def test_headings_have_a_circular_mean(headings, share, mean):
     X = [turned(walker(60), degrees) for degrees in headings]
-    found = blend_performances(even(*X), X, [1 - share, share], skeleton=PAPER)
+    found = blend_trials(even(*X), X, [1 - share, share], skeleton=PAPER)
     np.testing.assert_allclose(found, turned(walker(60), mean), atol=1e-9)
 
 
@@ -207,7 +207,7 @@ def test_turning_and_standing_bodies_give_half_the_turn():
     x = walker(61)
     degrees = np.linspace(0, 360, 61)
     around = np.stack([turned(f, d) for f, d in zip(standing(61), degrees, strict=True)])
-    found = blend_performances(even(x, x), [around, standing(61)], [0.5, 0.5], skeleton=PAPER)
+    found = blend_trials(even(x, x), [around, standing(61)], [0.5, 0.5], skeleton=PAPER)
     half = np.stack([turned(f, d / 2) for f, d in zip(standing(61), degrees, strict=True)])
     # Feet of the second stand, and their chords are shorter than their arcs.
     np.testing.assert_allclose(found, half, atol=1e-4)
@@ -229,13 +229,13 @@ def test_blend_of_cartwheels_keeps_its_heading(leans, n):
     They are near the vertical in a single frame of 17, or in several of 61.
     """
     X = [cartwheel(lean, n) for lean in leans]
-    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER)
+    found = blend_trials(even(*X), X, [0.5, 0.5], skeleton=PAPER)
     middle = cartwheel(np.mean(leans), n)
     # From the pelvis, the first joint.
     apart = [x.reshape(n, -1, 3) - x.reshape(n, -1, 3)[:, :1] for x in (found, middle)]
     np.testing.assert_allclose(*apart, atol=0.05)
     for i in (0, 1):
-        back = blend_performances(even(*X), X, {i: 1}, skeleton=PAPER)
+        back = blend_trials(even(*X), X, {i: 1}, skeleton=PAPER)
         np.testing.assert_allclose(back, X[i], atol=1e-12)
 
 
@@ -244,7 +244,7 @@ def test_noise_does_not_rotate_a_lying_body():
     lying = np.repeat(cartwheel(0)[15:16], 61, axis=0)
     noise = np.random.default_rng(0).normal(scale=0.01, size=(2, *lying.shape))
     X = list(lying + noise)
-    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER)
+    found = blend_trials(even(*X), X, [0.5, 0.5], skeleton=PAPER)
     assert np.abs(found - lying).max() < 0.08
 
 
@@ -252,7 +252,7 @@ def test_transition_between_walks_is_continuous():
     X = [walker(60), turned(walker(60, seed=1), 90)]
     X[1][:, ::3] += 20  # far away, on another floor
     X[1][:, 1::3] += 20
-    found = blend_performances(even(*X), X, [[1, 0], [0, 1]], skeleton=PAPER)
+    found = blend_trials(even(*X), X, [[1, 0], [0, 1]], skeleton=PAPER)
     pelvis = found[:, [0, 2]]
     assert np.linalg.norm(np.diff(pelvis, axis=0), axis=1).max() < 0.1
     np.testing.assert_allclose(found[0], X[0][0], atol=0.02)
@@ -265,7 +265,7 @@ def test_transition_between_walks_is_continuous():
 
 
 def match_of_events(*events, n_frames=41):
-    """A match of performances whose event lies at these shares of their time."""
+    """A match of trials whose event lies at these shares of their time."""
     frames = np.arange(n_frames)
     middle = (n_frames - 1) / 2
     times = [np.interp(frames, [0, middle, 2 * middle], [0, 2 * e * middle, 2 * middle])
@@ -281,7 +281,7 @@ def tent(n_frames, event):
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 1.0])
 def test_events_and_durations_are_blended(share):
     X = [tent(101, 0.3), tent(201, 0.6)]
-    found = blend_performances(match_of_events(0.3, 0.6), X, [1 - share, share])
+    found = blend_trials(match_of_events(0.3, 0.6), X, [1 - share, share])
     assert len(found) == 101 + 100 * share
     # Events 30 and 120 frames from the beginning.
     assert found.argmax() == round((1 - share) * 30 + share * 120)
@@ -290,16 +290,16 @@ def test_events_and_durations_are_blended(share):
 
 def test_timing_has_weights_of_its_own():
     X = [tent(101, 0.3), 2 * tent(201, 0.6)]
-    found = blend_performances(match_of_events(0.3, 0.6), X, [1, 0], timing={1: 1})
+    found = blend_trials(match_of_events(0.3, 0.6), X, [1, 0], timing={1: 1})
     np.testing.assert_allclose(found, X[1] / 2, atol=1e-9)
 
 
 def test_extrapolated_time_never_runs_backwards():
     X = [tent(101, 0.3), tent(101, 0.4)]
-    found = blend_performances(match_of_events(0.3, 0.4), X, [1.5, -0.5])
+    found = blend_trials(match_of_events(0.3, 0.4), X, [1.5, -0.5])
     assert found.argmax() == 25
     # Time does not run backwards, where it would: 0.3 - 4 * 0.1 of the time.
-    found = blend_performances(match_of_events(0.3, 0.4), X, [5, -4])
+    found = blend_trials(match_of_events(0.3, 0.4), X, [5, -4])
     assert len(found) > 60
     assert 0 < found.argmax() <= 15 + 1
 
@@ -307,7 +307,7 @@ def test_extrapolated_time_never_runs_backwards():
 @pytest.mark.parametrize("weights", [[[1, 0], [0, 1]], [[1, 0], [1, 0], [0, 1], [0, 1]]])
 def test_transition_takes_the_pace_of_each(weights):
     X = [np.linspace(0, 1, 51)[:, np.newaxis], np.linspace(0, 1, 201)[:, np.newaxis]]
-    found = blend_performances(match_of_events(0.5, 0.5), X, weights)
+    found = blend_trials(match_of_events(0.5, 0.5), X, weights)
     assert len(found) == 126
     speed = np.diff(found[:, 0])
     assert speed[0] == pytest.approx(1 / 50, rel=0.05)
@@ -319,21 +319,21 @@ def test_transition_takes_the_pace_of_each(weights):
 
 def test_match_and_pipeline_give_the_same(bending, pipe):
     X = bending.data[:4]
-    whole = blend_performances(pipe, X, [0.2, 0, 0.8, 0])
+    whole = blend_trials(pipe, X, [0.2, 0, 0.8, 0])
     match = Match.from_estimator(pipe, X[::2])
-    some = blend_performances(match, X[::2], [0.2, 0.8], skeleton=bending.skeleton)
+    some = blend_trials(match, X[::2], [0.2, 0.8], skeleton=bending.skeleton)
     np.testing.assert_array_equal(whole, some)
 
 
 def test_features_without_a_skeleton_are_averaged():
     X = [np.full((5, 2), 1.0), np.full((9, 2), 3.0)]
-    found = blend_performances(LinearSynchronizer().fit(X), X, [0.25, 0.75])
+    found = blend_trials(LinearSynchronizer().fit(X), X, [0.25, 0.75])
     np.testing.assert_allclose(found, np.full((8, 2), 2.5))
 
 
 def test_rows_give_a_row():
     X = np.sin(np.linspace(0, 3, 40) + [[0], [0.1], [0.2]])
-    found = blend_performances(DenseSynchronizer().fit(X), X, [1, 0, 0])
+    found = blend_trials(DenseSynchronizer().fit(X), X, [1, 0, 0])
     np.testing.assert_allclose(found, X[0], atol=1e-12)
 
 
@@ -342,24 +342,24 @@ def test_tables_keep_labels_and_names(bending):
     pipe = make_pipeline(DirectionCosines(bending.skeleton), DenseSynchronizer()).fit(tables)
     keys = ["ann", "bob", "cat"]
     df = pd.concat(tables, keys=keys, names=["subject", "time"])
-    for X in (df, to_sequences(df)):
-        found = blend_performances(pipe, X, {"ann": 0.5, "cat": 0.5})
+    for X in (df, to_trials(df)):
+        found = blend_trials(pipe, X, {"ann": 0.5, "cat": 0.5})
         assert list(found.columns) == bending.skeleton.column_names
         assert found.index.name == "time"
         assert Skeleton.from_frame(found) == Skeleton.from_frame(tables[0])
     weights = pd.Series({"bob": 1.0})
-    found = blend_performances(pipe, df, weights)
+    found = blend_trials(pipe, df, weights)
     np.testing.assert_allclose(found, tables[1], atol=1e-12)
-    by_number = blend_performances(pipe, df, {1: 1})
+    by_number = blend_trials(pipe, df, {1: 1})
     np.testing.assert_array_equal(by_number, found)
 
 
-def test_a_blend_has_no_events_of_one_performance():
+def test_a_blend_has_no_events_of_one_trial():
     takes = [pd.DataFrame({"knee": np.sin(np.arange(n) / 9)}) for n in (40, 50, 60)]
     for x in takes:
         x.attrs = {"frame_rate": 120.0, "units": "deg", "first_frame": 3, "events": [{"frame": 9}]}
     X = [x.iloc[::2] for x in takes]
-    found = blend_performances(LinearSynchronizer().fit(X), X, [0.5, 0.5, 0])
+    found = blend_trials(LinearSynchronizer().fit(X), X, [0.5, 0.5, 0])
     assert found.attrs == {"frame_rate": 60.0, "units": "deg"}
 
 
@@ -375,7 +375,7 @@ def test_a_blend_has_no_events_of_one_performance():
 )
 def test_tables_get_even_times(times, expected):
     X = [pd.DataFrame(np.ones((n, 2)), pd.Index(times(n), name="time")) for n in (41, 61)]
-    found = blend_performances(even(*X), X, [0.5, 0.5])
+    found = blend_trials(even(*X), X, [0.5, 0.5])
     assert len(found) == 51
     assert found.index[0] == 0 * expected
     np.testing.assert_allclose(np.diff(found.index) / expected, 1)
@@ -386,47 +386,47 @@ def test_tables_get_even_times(times, expected):
     ("change", "message"),
     [
         ({"weights": [1, 1, 0]}, "sum 1, got 2"),
-        ({"weights": [0.5, 0.5]}, "one for each of the 3 performances"),
+        ({"weights": [0.5, 0.5]}, "one for each of the 3 trials"),
         ({"weights": [[1, 0, 0], [np.nan, 1, 0]]}, "weights, row 1, feature 0 is NaN"),
-        ({"weights": [1e9, 1 - 1e9, 0]}, "frames; the longest performance has 1"),
+        ({"weights": [1e9, 1 - 1e9, 0]}, "frames; the longest trial has 1"),
         ({"weights": {0: [0, 1], 1: [1, 0]}}, r"0 has numbers of shape \(2,\)"),
         ({"weights": [[1, 0, 0], [0, 0, 0]]}, "row 1, must have the sum 1"),
         ({"weights": np.zeros((2, 2, 3))}, "got shape"),
-        ({"weights": {7: 1}}, "no performance 7"),
+        ({"weights": {7: 1}}, "no trial 7"),
         ({"weights": "one"}, "not a numeric array"),
         ({"timing": [1, 1, 1]}, "timing must have the sum 1"),
         ({"skeleton": "kinect"}, "must be the Skeleton"),
         ({"skeleton": Skeleton.kinect()}, "joints need 60"),
-        ({"X": np.zeros((5, 45))}, "Wrap one performance"),
+        ({"X": np.zeros((5, 45))}, "Wrap one trial"),
         ({"X": [np.zeros((9, 3))] * 3}, "joints need 45"),
     ],
 )
 def test_refuses_invalid_arguments(bending, pipe, change, message):
     args = {"X": bending.data[:3], "weights": [1, 0, 0]} | change
     with pytest.raises(ValueError, match=message):
-        blend_performances(pipe, **args)
+        blend_trials(pipe, **args)
 
 
 def test_refuses_gaps_and_sequences_that_do_not_suit_the_match(bending, pipe):
     X = [x.copy() for x in bending.data[:2]]
     X[1][7, 3] = np.nan
     match = Match.from_estimator(pipe, bending.data[:2])
-    with pytest.raises(ValueError, match="Performance 1, frame 7"):
-        blend_performances(match, X, [1, 0], skeleton=bending.skeleton)
+    with pytest.raises(ValueError, match="Trial 1, frame 7"):
+        blend_trials(match, X, [1, 0], skeleton=bending.skeleton)
     with pytest.raises(ValueError, match="matched"):
-        blend_performances(match, X[:1], [1], skeleton=bending.skeleton)
+        blend_trials(match, X[:1], [1], skeleton=bending.skeleton)
     with pytest.raises(TypeError, match="takes no"):
-        blend_performances(match, X[:1], [1], keyframes=[])
+        blend_trials(match, X[:1], [1], keyframes=[])
 
 
 def test_keyframes_are_passed_to_the_match(bending):
     X, keyframes = bending.data[:4], bending.keyframes[:4]
     pipe = make_pipeline(DirectionCosines(bending.skeleton), LinearSynchronizer())
     pipe.fit(X, linearsynchronizer__keyframes=keyframes)
-    found = blend_performances(pipe, X, [0, 1, 0, 0], keyframes=keyframes)
+    found = blend_trials(pipe, X, [0, 1, 0, 0], keyframes=keyframes)
     np.testing.assert_allclose(found, X[1], atol=1e-12)
-    with pytest.raises(ValueError, match=r"blend_performances\(estimator, X, keyframes="):
-        blend_performances(pipe, X, [0, 1, 0, 0])
+    with pytest.raises(ValueError, match=r"blend_trials\(estimator, X, keyframes="):
+        blend_trials(pipe, X, [0, 1, 0, 0])
 
 
 @pytest.mark.parametrize("heading", [0, 90])
@@ -435,8 +435,8 @@ def test_a_root_that_stands_still_is_no_limb(heading):
     walks = [walker(50), turned(walker(50, 1.3, seed=1), heading)]
     tables = [with_still_root(x, PAPER, (k, 0.5, 2)) for k, x in enumerate(walks)]
     skeleton = Skeleton.from_frame(tables[0])
-    blend = blend_performances(even(50, 50), tables, [0.25, 0.75], skeleton=skeleton)
-    expected = blend_performances(even(50, 50), walks, [0.25, 0.75], skeleton=PAPER)
+    blend = blend_trials(even(50, 50), tables, [0.25, 0.75], skeleton=skeleton)
+    expected = blend_trials(even(50, 50), walks, [0.25, 0.75], skeleton=PAPER)
     np.testing.assert_allclose(blend[PAPER.column_names], expected, atol=1e-12)
     root = blend[["World_x", "World_y", "World_z"]]
     np.testing.assert_allclose(root, np.tile([0.75, 0.5, 2], (50, 1)), atol=1e-12)

@@ -8,7 +8,7 @@ from oracle import slow_filter
 
 BOTH = [LinearSynchronizer, DenseSynchronizer]
 # The settings at which DenseSynchronizer is the paper's method.
-PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
+PAPER = {"cost": "pose", "max_rate": 2, "consensus": 0}
 
 
 def curve(phase):
@@ -151,7 +151,7 @@ def test_offsets_reach_max_offset(n_frames, max_offset, reach):
         {"n_frames": 18},
         {"consensus": 2},
         {"max_offset": 0.04},
-        {"cost": "posture", "max_rate": 3},
+        {"cost": "pose", "max_rate": 3},
     ],
     ids=str,
 )

@@ -10,7 +10,7 @@ from sklearn_motionsync import (
     DirectionCosines,
     SynchronizationWarning,
 )
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.matching.metric import Evidence
 from sklearn_motionsync.synchronizers.learning import weigh_evidence
 
@@ -74,7 +74,7 @@ def test_one_movement_is_consistent():
     assert evidence.remaining < 0.3
 
 
-@pytest.mark.parametrize("params", [{"metric": None}, {"consensus": 0}, {"cost": "posture"}])
+@pytest.mark.parametrize("params", [{"metric": None}, {"consensus": 0}, {"cost": "pose"}])
 def test_nothing_is_known_without_a_metric(params):
     evidence = DenseSynchronizer(P, **params).fit(chance(12)).evidence_
     assert np.isnan([evidence.inconsistency, evidence.remaining]).all()
@@ -94,7 +94,7 @@ KINECT = {"sitDown": False, "throw": True}
 
 @pytest.mark.parametrize("action", KINECT)
 def test_people_seen_by_a_kinect(action, real_data):
-    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    bunch = load_trials(real_data / "utkinect" / "utkinect_positions.npz")
     X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action and len(x) >= 8]
     points = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(X))
     with warnings.catch_warnings(record=True) as caught:
@@ -105,7 +105,7 @@ def test_people_seen_by_a_kinect(action, real_data):
 
 
 def test_every_action_of_optical_recordings_is_supported(real_data):
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     for action in sorted(set(bunch.target))[::2]:
         X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action]
         points = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(X))

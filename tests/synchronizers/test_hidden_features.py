@@ -1,4 +1,4 @@
-"""Performances with gaps: what is matched, kept as NaN, and refused."""
+"""Trials with gaps: what is matched, kept as NaN, and refused."""
 
 import numpy as np
 import pandas as pd
@@ -31,10 +31,10 @@ SYNCHRONIZERS = {
 WHOLE = [x[:, 6:18] for x in make_bending(8, random_state=0).data]
 
 
-def with_gaps(performances, seed=0):
+def with_gaps(trials, seed=0):
     """A limb hidden for a third, some frames gone, and a feature that flickers."""
     rng = np.random.default_rng(seed)
-    out = [x.copy() for x in performances]
+    out = [x.copy() for x in trials]
     for i, x in enumerate(out):
         n = len(x)
         if i % 3 == 0:
@@ -56,7 +56,7 @@ def mean_error(times, expected):
 def test_warps_are_those_without_gaps_nearly(name):
     sync = clone(SYNCHRONIZERS[name])
     expected = sync.fit(WHOLE).match(WHOLE)
-    # Learnt from whole performances, and from those with gaps.
+    # Learnt from whole trials, and from those with gaps.
     after = sync.match(GAPPY)
     # To the same pattern.
     inner = sync.synchronizer_ if name in ("parts", "timing") else sync
@@ -68,7 +68,7 @@ def test_warps_are_those_without_gaps_nearly(name):
 
 
 @pytest.mark.parametrize("name", ["dense", "parts", "linear"])
-def test_performances_without_gaps_keep_every_bit(name):
+def test_trials_without_gaps_keep_every_bit(name):
     sync = clone(SYNCHRONIZERS[name]).fit(WHOLE)
     whole = [5, 6]
     some = [GAPPY[0], WHOLE[5], GAPPY[1], WHOLE[6]]
@@ -110,7 +110,7 @@ def test_frames_of_which_nothing_is_seen_take_their_time_from_their_neighbours()
         assert np.abs(times - expected[i]).max() < 3
 
 
-def test_a_feature_that_one_performance_never_shows():
+def test_a_feature_that_one_trial_never_shows():
     sync = DenseSynchronizer(P)
     X = [x.copy() for x in WHOLE]
     X[2][:, 4] = np.nan
@@ -136,7 +136,7 @@ def test_arrays_of_three_and_two_dimensions_and_memory_maps(tmp_path):
     np.testing.assert_array_equal(out, alone[:, :, 0])
 
 
-def test_a_warp_depends_on_its_performance_alone():
+def test_a_warp_depends_on_its_trial_alone():
     sync = clone(DENSE).fit(GAPPY)
     together = sync.match(GAPPY)
     for i, x in enumerate(GAPPY):
@@ -147,12 +147,12 @@ def test_a_warp_depends_on_its_performance_alone():
 
 
 @pytest.mark.parametrize("name", ["dense", "parts", "timing", "linear"])
-def test_a_performance_that_shows_nothing_is_refused_by_its_index(name):
+def test_a_trial_that_shows_nothing_is_refused_by_its_index(name):
     empty = [*GAPPY[:3], np.full((30, 12), np.nan)]
     sync = clone(SYNCHRONIZERS[name])
-    with pytest.raises(ValueError, match=r"Performance 3 is NaN in every frame and feature.*Leave"):
+    with pytest.raises(ValueError, match=r"Trial 3 is NaN in every frame and feature.*Leave"):
         sync.fit(empty)
-    with pytest.raises(ValueError, match=r"Performance 3 is NaN in every frame and feature.*Leave"):
+    with pytest.raises(ValueError, match=r"Trial 3 is NaN in every frame and feature.*Leave"):
         sync.fit(WHOLE).match(empty)
 
 
@@ -172,7 +172,7 @@ def test_a_feature_that_is_never_seen_is_refused_by_its_name():
 def test_infinity_and_gaps_of_a_pattern_are_refused():
     X = [x.copy() for x in GAPPY]
     X[4][3, 2] = np.inf
-    with pytest.raises(ValueError, match="Performance 4, frame 3, feature 2 is infinity"):
+    with pytest.raises(ValueError, match="Trial 4, frame 3, feature 2 is infinity"):
         clone(DENSE).fit(X)
     with pytest.raises(ValueError, match=r"The pattern, frame \d+, feature \d is NaN"):
         DenseSynchronizer(P, pattern=GAPPY[0][:, :]).fit(GAPPY)
@@ -188,7 +188,7 @@ def test_filling_by_the_model_is_better_than_the_mean(name):
     hidden = np.isnan(out)
     np.testing.assert_array_equal(filled[~hidden], out[~hidden])
     assert np.isfinite(filled).all()
-    # The same moments of the whole performances.
+    # The same moments of the whole trials.
     truth = sync.match(GAPPY).warp(WHOLE) if name != "parts" else sync.transform(WHOLE)
     mean = np.broadcast_to(sync.transform(WHOLE).mean(axis=0), out.shape)
     errors = [np.abs(guess - truth)[hidden].mean() for guess in (filled, mean)]
@@ -196,7 +196,7 @@ def test_filling_by_the_model_is_better_than_the_mean(name):
 
 
 def test_a_gap_at_which_all_deviate_alike_is_filled_exactly():
-    # Each performance is the mean plus a constant of its own in every feature.
+    # Each trial is the mean plus a constant of its own in every feature.
     t = np.linspace(0, 1, P)[:, np.newaxis]
     mean = np.concatenate([np.sin(6 * t), np.cos(5 * t)], axis=1)
     X = [mean + shift for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
@@ -227,9 +227,9 @@ def test_an_unknown_fill_is_refused(fill):
 # -- confidence= ----------------------------------------------------------------------------
 
 
-def confidences(performances):
+def confidences(trials):
     """1 where something was seen, else 0."""
-    return [np.isfinite(x).astype(float) for x in performances]
+    return [np.isfinite(x).astype(float) for x in trials]
 
 
 @pytest.mark.parametrize("name", ["dense", "linear", "parts"])
@@ -297,9 +297,9 @@ WRONG = {
     "one for all": (np.ones(3), "list of 8 arrays"),
     "a number": (0.5, "list of 8 arrays"),
     "too many": ([np.ones(len(x)) for x in [*WHOLE, WHOLE[0]]], "a list of 8 arrays"),
-    "length": ([np.ones(3)] * 8, r"Performance 0: confidence has shape \(3,\), expected"),
-    "range": ([2.0 * np.ones(len(x)) for x in WHOLE], "Performance 0: .*from 0.*to 1, got 2 to 2"),
-    "NaN": ([np.full(len(x), np.nan) for x in WHOLE], "Performance 0: confidence must be from 0"),
+    "length": ([np.ones(3)] * 8, r"Trial 0: confidence has shape \(3,\), expected"),
+    "range": ([2.0 * np.ones(len(x)) for x in WHOLE], "Trial 0: .*from 0.*to 1, got 2 to 2"),
+    "NaN": ([np.full(len(x), np.nan) for x in WHOLE], "Trial 0: confidence must be from 0"),
 }
 
 
@@ -313,21 +313,21 @@ def test_wrong_confidence_is_refused(case):
 # -- displays, lags and tables --------------------------------------------------------------
 
 
-def test_displays_of_performances_with_gaps():
+def test_displays_of_trials_with_gaps():
     sync = clone(DENSE).fit(GAPPY)
     shown = SynchronizationDisplay.from_estimator(sync, GAPPY, features=[3, 4])
-    assert shown.titles[1] == f"the template, trial {sync.pattern_index_}"
+    assert shown.titles[1] == f"the pattern, trial {sync.pattern_index_}"
     # Drawn as a gap: matplotlib leaves the hidden points out.
     hidden = np.isnan(shown.after[0, :, 0])
     assert hidden.any()
     paths = shown.after_[0].get_paths()[0].vertices
     np.testing.assert_array_equal(np.isnan(paths[:, 1]), hidden)
     assert np.isfinite(shown.pattern_[0].get_ydata()).all()
-    TrellisDisplay.from_estimator(sync, GAPPY, performance=1)
+    TrellisDisplay.from_estimator(sync, GAPPY, trial=1)
     MetricDisplay.from_estimator(sync)
 
 
-def test_lags_and_tables_of_performances_with_gaps():
+def test_lags_and_tables_of_trials_with_gaps():
     parts = clone(SYNCHRONIZERS["parts"]).fit(GAPPY)
     assert np.isfinite(parts.lags(GAPPY).values).all()
     table = parts.match(GAPPY).to_frame("percent", GAPPY)

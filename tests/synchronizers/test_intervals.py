@@ -1,4 +1,4 @@
-"""How sure a match is: intervals of its times, doubtful performances, and calibration."""
+"""How sure a match is: intervals of its times, doubtful trials, and calibration."""
 
 import pickle
 import warnings
@@ -16,7 +16,7 @@ from sklearn_motionsync import (
     PartSynchronizer,
     SynchronizationWarning,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.inputs import validation
 
 P = 60
@@ -28,7 +28,7 @@ def fitted(bending_aspace):
 
 
 def true_warps(bunch, pattern, n_frames):
-    """The times (n, P) at which all performances show what one of them does."""
+    """The times (n, P) at which all trials show what one of them does."""
     clocks = [np.linspace(0, n_frames - 1, len(phase)) for phase in bunch.times]
     frames = np.arange(n_frames)
     phases = np.interp(frames, clocks[pattern], bunch.times[pattern])
@@ -75,7 +75,7 @@ def test_the_pattern_is_certain_of_itself(fitted, bending_aspace):
     np.testing.assert_allclose(upper, lower, atol=1e-6)
 
 
-def test_one_performance_by_itself_has_the_same_intervals(fitted, bending_aspace):
+def test_one_trial_by_itself_has_the_same_intervals(fitted, bending_aspace):
     several = bending_aspace[12:16]
     together = fitted.match(several)
     for i, x in enumerate(several):
@@ -85,7 +85,7 @@ def test_one_performance_by_itself_has_the_same_intervals(fitted, bending_aspace
         assert alone.reasons[0] == together.reasons[i]
 
 
-def test_performances_in_parts_have_the_same_intervals(bending_aspace, monkeypatch, tmp_path):
+def test_trials_in_parts_have_the_same_intervals(bending_aspace, monkeypatch, tmp_path):
     X = np.stack([x[np.linspace(0, len(x) - 1, 50).astype(int)] for x in bending_aspace[:14]])
     sync = DenseSynchronizer(P).fit(X)
     np.save(tmp_path / "X.npy", X)
@@ -223,12 +223,12 @@ def test_coverage_of_people_held_out(real_data, benchmark):
         actors = np.asarray(one.actors)
         for actor in np.unique(actors):
             train, test = np.flatnonzero(actors != actor), np.flatnonzero(actors == actor)
-            space = ASpace().fit([one.postures[i] for i in train])
-            known = space.transform([one.postures[i] for i in train])
+            space = ASpace().fit([one.poses[i] for i in train])
+            known = space.transform([one.poses[i] for i in train])
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 sync = DenseSynchronizer(100).fit(known)
-            match = sync.match(space.transform([one.postures[i] for i in test]))
+            match = sync.match(space.transform([one.poses[i] for i in test]))
             lower, upper = match.interval(0.9)
             for at in one.moments.values():
                 moment = at[train[sync.pattern_index_]]
@@ -241,10 +241,10 @@ def test_coverage_of_people_held_out(real_data, benchmark):
     assert 0.87 < np.mean(inside) <= 1
 
 
-# -- doubtful performances ----------------------------------------------------------------
+# -- doubtful trials ----------------------------------------------------------------
 
 
-def test_performances_that_are_repeated_cut_off_or_still_are_doubtful(fitted, bending_aspace):
+def test_trials_that_are_repeated_cut_off_or_still_are_doubtful(fitted, bending_aspace):
     own = bending_aspace[12:22]
     assert not fitted.match(own).doubtful.any()
     wrong = {
@@ -283,7 +283,7 @@ def test_the_way_back_of_a_movement_that_is_alike_both_ways_is_not_doubted(bends
 
 
 def test_trials_of_a_set_without_support_are_doubtful(real_data):
-    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    bunch = load_trials(real_data / "utkinect" / "utkinect_positions.npz")
     chosen = [i for i, t in enumerate(bunch.target) if t == "throw" and len(bunch.data[i]) >= 8]
     some = np.unique(np.linspace(0, len(chosen) - 1, 12).astype(int))
     data = [bunch.data[chosen[i]] for i in some]

@@ -17,7 +17,7 @@ from sklearn_motionsync import (
     Match,
     PartSynchronizer,
     TimingChannel,
-    blend_performances,
+    blend_trials,
     find_departures,
     to_frame,
 )
@@ -35,7 +35,7 @@ SOME[1], SOME[5, 0] = np.nan, np.nan
 LABELS = [(person, int(cycle)) for person, cycle in zip(GAIT.person, GAIT.cycle, strict=True)]
 TABLES = [pd.DataFrame(x, columns=GAIT.feature_names) for x in X]
 for table, label in zip(TABLES, LABELS, strict=True):
-    table.attrs = {"performance": label, "levels": ("person", "cycle", "frame")}
+    table.attrs = {"trial": label, "levels": ("person", "cycle", "frame")}
 INDEX = pd.MultiIndex.from_tuples(LABELS, names=["person", "cycle"])
 
 SYNCHRONIZERS = {
@@ -146,13 +146,13 @@ def test_what_comes_after_takes_them(case):
     np.testing.assert_array_equal(match.times, times)
     display = SynchronizationDisplay.from_estimator(pipe, TABLES, keyframes=K)
     np.testing.assert_array_equal(display.match.times, times)
-    blend = blend_performances(pipe, TABLES, {0: 0.5, 2: 0.5}, keyframes=K)
-    pd.testing.assert_frame_equal(blend, blend_performances(match, TABLES, {0: 0.5, 2: 0.5}))
+    blend = blend_trials(pipe, TABLES, {0: 0.5, 2: 0.5}, keyframes=K)
+    pd.testing.assert_frame_equal(blend, blend_trials(match, TABLES, {0: 0.5, 2: 0.5}))
     channel = TimingChannel(clone(sync)).fit(X, keyframes=K)
     curves = clone(sync).fit(X, keyframes=K).match(X, keyframes=K).warp(X)
     np.testing.assert_array_equal(channel.transform(X, keyframes=K)[:, :, :-1], curves)
     if isinstance(sync, DenseSynchronizer):
-        trellis = TrellisDisplay.from_estimator(pipe, TABLES, performance=3, keyframes=K)
+        trellis = TrellisDisplay.from_estimator(pipe, TABLES, trial=3, keyframes=K)
         np.testing.assert_array_equal(trellis.warp, match.offsets[3])
 
 
@@ -163,7 +163,7 @@ def test_models_of_anchored_trials_take_them(case):
         pipe = make_pipeline(asking, ActionModel()).fit(X, keyframes=K)
     model = ActionModel().fit(expected)
     display = ActionModelDisplay.from_estimator(pipe, X, keyframes=K, features=0)
-    np.testing.assert_array_equal(display.performances, expected[:, :, :1])
+    np.testing.assert_array_equal(display.trials, expected[:, :, :1])
     found, others = find_departures(pipe, X, keyframes=K), find_departures(model, list(expected))
     # A model by itself does not tell what timing explains.
     differing = ["feature", "timing"]

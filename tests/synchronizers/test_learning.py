@@ -8,7 +8,7 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     LinearSynchronizer,
 )
-from sklearn_motionsync.inputs.collections import Performances
+from sklearn_motionsync.inputs.collections import Trials
 from sklearn_motionsync.synchronizers import learning
 from sklearn_motionsync.synchronizers.learning import (
     finish_warps,
@@ -21,7 +21,7 @@ from sklearn_motionsync.synchronizers.training import TrainingSet, pattern_of, p
 from sklearn_motionsync.utils.parallel import Progress
 
 
-def trials(n, style=0.3, n_features=2):
+def styled(n, style=0.3, n_features=2):
     """One movement in several styles and at several paces."""
     rng = np.random.default_rng(0)
     X = []
@@ -43,24 +43,24 @@ def trials(n, style=0.3, n_features=2):
         {"style": 0.0},
         {"pattern": 2, "consensus": 3},
         {"metric": None, "consensus": 3},
-        {"cost": "posture", "max_rate": 2, "consensus": 0},
+        {"cost": "pose", "max_rate": 2, "consensus": 0},
     ],
     ids=str,
 )
 def test_six_steps_by_hand_arrive_at_the_same_times(params):
     """Copies of one source are refined, other trials sharpened, and those of the paper neither."""
     params = dict(params)
-    X = trials(7, params.pop("style", 0.3))
+    X = styled(7, params.pop("style", 0.3))
     sync = DenseSynchronizer(**params).fit(X)
     settings = sync.get_params()
-    performances = Performances(X, "list", list(range(len(X))))
-    training = TrainingSet(performances, None, len(X))
+    trials = Trials(X, "list", list(range(len(X))))
+    training = TrainingSet(trials, None, len(X))
     names = "cost", "metric", "consensus", "smoothness", "max_offset", "max_rate"
     with Progress(sync, 0) as progress:
         clock = put_on_clock(training, None, None, "fewer frames")
         step = learn_metric(clock, **{name: settings[name] for name in names})
         jobs = {"random_state": 0, "n_jobs": None, "progress": progress}
-        pairs = match_pairs(clock, step, True, trials=performances, names=None, **jobs)
+        pairs = match_pairs(clock, step, True, trials=trials, names=None, **jobs)
         pattern = pattern_of(training, sync.pattern, pairs.median)
         vote = let_exemplars_vote(clock, training, pattern, pairs, sync.consensus)
         final = finish_warps(clock, training, pattern, vote, "auto")
@@ -79,10 +79,10 @@ def test_six_steps_by_hand_arrive_at_the_same_times(params):
 
 
 def test_steps_change_nothing_that_they_are_given():
-    X = trials(6)
+    X = styled(6)
     for x in X:
         x.flags.writeable = False
-    training = TrainingSet(Performances(X, "list", list(range(6))), None, 6)
+    training = TrainingSet(Trials(X, "list", list(range(6))), None, 6)
     clock = put_on_clock(training, 50, None, "fewer frames")
     clock.positions.flags.writeable = clock.examples.flags.writeable = False
     before = clock.positions.copy()
@@ -107,7 +107,7 @@ def test_steps_change_nothing_that_they_are_given():
 @pytest.mark.parametrize("n_features", [1, 2])
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_few_trials(n, n_features, dtype):
-    X = [x.astype(dtype) for x in trials(n, 0.0, n_features)]
+    X = [x.astype(dtype) for x in styled(n, 0.0, n_features)]
     sync = DenseSynchronizer().fit(X)
     assert (sync.metric_ is None) == (n < 3)
     assert sync.evidence_.weak is False
@@ -127,7 +127,7 @@ def test_few_trials(n, n_features, dtype):
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_constant_signals_count_for_nothing(dtype):
-    X = [x.astype(dtype) for x in trials(6)]
+    X = [x.astype(dtype) for x in styled(6)]
     still = [np.concatenate([x, np.full((len(x), 2), [0.1, -3])], axis=1, dtype=dtype) for x in X]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -145,7 +145,7 @@ def test_constant_signals_count_for_nothing(dtype):
 
 
 def test_fit_that_is_interrupted_leaves_the_earlier_one_usable(monkeypatch):
-    X = trials(5)
+    X = styled(5)
     sync = DenseSynchronizer().fit(X)
     expected, attributes = sync.transform(X), dict(vars(sync))
 

@@ -99,9 +99,9 @@ def test_timing_errors_with_keyframes_and_without(bending, bending_aspace):
     ("keyframes", "message"),
     [
         (3, "list of 2 arrays .*; got 3"),
-        ([[2, 5], [2, 9]], "Performance 1: .* both excluded"),
-        ([[0, 5], [2, 5]], "Performance 0: "),
-        ([[2, 5], 3], "Performance 1: "),
+        ([[2, 5], [2, 9]], "Trial 1: .* both excluded"),
+        ([[0, 5], [2, 5]], "Trial 0: "),
+        ([[2, 5], 3], "Trial 1: "),
     ],
 )
 def test_fit_refuses_invalid_keyframes(keyframes, message):
@@ -112,7 +112,7 @@ def test_fit_refuses_invalid_keyframes(keyframes, message):
 
 def test_transform_needs_keyframes_after_a_fit_with_them(bending):
     sync = LinearSynchronizer().fit(bending.data, keyframes=bending.keyframes)
-    with pytest.raises(ValueError, match="give those of these performances too"):
+    with pytest.raises(ValueError, match="give those of these trials too"):
         sync.transform(bending.data)
     with pytest.raises(ValueError, match="must be 5 increasing"):
         sync.transform(bending.data, keyframes=bending.keyframes[:, :4])
@@ -147,7 +147,7 @@ def test_keyframes_in_seconds_are_refused(n_frames, frames, is_refused):
     ]
     for call in calls:
         if is_refused:
-            with pytest.raises(ValueError, match=r"Performance 1: .* look like seconds, .*_rate"):
+            with pytest.raises(ValueError, match=r"Trial 1: .* look like seconds, .*_rate"):
                 call()
         else:
             call()
@@ -166,11 +166,11 @@ def test_events_of_other_rows_are_no_keyframes():
     ):
         X = [*takes[:2], takes[2].iloc[rows]]
         for call in (LinearSynchronizer().fit, sync.match, sync.transform):
-            with pytest.raises(ValueError, match=f"Performance 2: .*{words} of the recording"):
+            with pytest.raises(ValueError, match=f"Trial 2: .*{words} of the recording"):
                 call(X, keyframes=keyframes)
             table = pd.concat(X, keys=range(3))
             table.attrs = takes[0].attrs
-            with pytest.raises(ValueError, match=f"Performance 2: .*{words} of the recording"):
+            with pytest.raises(ValueError, match=f"Trial 2: .*{words} of the recording"):
                 call(table, keyframes=keyframes)
             call([x.reset_index(drop=True) for x in X], keyframes=[[30.5], [30.5], [20.5]])
         # Without key-frames, or events to take them from, rows count.

@@ -1,4 +1,4 @@
-"""Many performances: memory by portions, what is read by index, and fits to a sample."""
+"""Many trials: memory by portions, what is read by index, and fits to a sample."""
 
 import tracemalloc
 
@@ -21,7 +21,7 @@ from sklearn_motionsync.synchronizers import learning, training
 
 from shift_synchronizer import ShiftSynchronizer
 
-PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0, "max_offset": 0.1}
+PAPER = {"cost": "pose", "max_rate": 2, "consensus": 0, "max_offset": 0.1}
 
 
 def walks(n, n_frames=30, n_features=3, dtype=np.float64):
@@ -30,17 +30,17 @@ def walks(n, n_frames=30, n_features=3, dtype=np.float64):
 
 
 class Files:
-    """Gives performances by index, and records the indices."""
+    """Gives trials by index, and records the indices."""
 
-    def __init__(self, performances):
-        self.performances, self.read = performances, []
+    def __init__(self, trials):
+        self.trials, self.read = trials, []
 
     def __len__(self):
-        return len(self.performances)
+        return len(self.trials)
 
     def __getitem__(self, i):
         self.read.append(i)
-        return self.performances[i]
+        return self.trials[i]
 
 
 class Rows(Files):
@@ -50,7 +50,7 @@ class Rows(Files):
 
     @property
     def shape(self):
-        return self.performances.shape
+        return self.trials.shape
 
     def __array__(self, dtype=None, copy=None):
         raise AssertionError("All of it is read.")
@@ -73,7 +73,7 @@ SYNCHRONIZERS = {
 
 @pytest.fixture
 def small_parts(monkeypatch):
-    """Five performances at a time."""
+    """Five trials at a time."""
     monkeypatch.setattr(reading, "MANY", 5)
 
 
@@ -89,10 +89,10 @@ def peak_of(call):
 # -- memory ---------------------------------------------------------------------------------
 
 
-def test_paths_of_long_performances_take_little_memory():
+def test_paths_of_long_trials_take_little_memory():
     """24 of 250 to 540 frames, 0.5 MB, whose rows of the trellis would take 180."""
     X = [np.cumsum(walks(1, n)[0], axis=0) for n in np.linspace(250, 540, 24).astype(int)]
-    sync = DenseSynchronizer(cost="posture").fit(X)
+    sync = DenseSynchronizer(cost="pose").fit(X)
     assert peak_of(lambda: sync.transform(X)) < 30e6
 
 
@@ -129,17 +129,17 @@ def test_memory_of_fit_and_transform_is_bounded():
     ("name", "kind"),
     [("dense", "lengths"), ("linear", "tables"), ("parts", "single"), ("outside", "double")],
 )
-def test_performances_are_read_once(name, kind):
-    performances, files = KINDS[kind], Files(KINDS[kind])
-    expected = clone(SYNCHRONIZERS[name]).fit(performances)
+def test_trials_are_read_once(name, kind):
+    trials, files = KINDS[kind], Files(KINDS[kind])
+    expected = clone(SYNCHRONIZERS[name]).fit(trials)
     sync = clone(SYNCHRONIZERS[name]).fit(files)
     assert sync.pattern_.tobytes() == expected.pattern_.tobytes()
     warped = sync.transform(files)
     assert files.read == 2 * list(range(len(X)))
     assert warped.dtype == expected.pattern_.dtype
-    np.testing.assert_array_equal(warped, expected.transform(performances))
-    times = sync.match(Files(performances)).times
-    np.testing.assert_array_equal(times, expected.match(performances).times)
+    np.testing.assert_array_equal(warped, expected.transform(trials))
+    times = sync.match(Files(trials)).times
+    np.testing.assert_array_equal(times, expected.match(trials).times)
 
 
 @pytest.mark.usefixtures("small_parts")
@@ -162,7 +162,7 @@ def test_tables_by_index_equal_a_list():
     sync = DenseSynchronizer().fit(KINDS["tables"]).set_output(transform="pandas")
     named = [x.copy() for x in KINDS["tables"]]
     for x, label in zip(named, "abcdefghijklmnop", strict=True):
-        x.attrs["performance"] = label
+        x.attrs["trial"] = label
     for given in (KINDS["tables"], named):
         pd.testing.assert_frame_equal(sync.transform(Files(given)), sync.transform(given))
 
@@ -181,18 +181,18 @@ BAD = {
     ("name", "bad"),
     [*(("dense", bad) for bad in BAD), ("parts", "infinity"), ("outside", "infinity")],
 )
-def test_transform_names_the_index_of_bad_performances(name, bad):
+def test_transform_names_the_index_of_bad_trials(name, bad):
     sync = clone(SYNCHRONIZERS[name]).fit(X)
     spoilt = list(X)
     spoilt[11], message = BAD[bad]
-    with pytest.raises(ValueError, match=f"Performance 11.*{message}"):
+    with pytest.raises(ValueError, match=f"Trial 11.*{message}"):
         sync.transform(Files(spoilt))
 
 
 def test_transform_refuses_mixed_precision():
     sync = LinearSynchronizer().fit(X)
     single = KINDS["single"]
-    with pytest.raises(ValueError, match="Performance 9 is float64, and those before are float32"):
+    with pytest.raises(ValueError, match="Trial 9 is float64, and those before are float32"):
         sync.transform(Files([*single[:9], *X[9:]]))
     assert sync.transform(Files([*X[:9], *single[9:]])).dtype == np.float64
 
@@ -203,7 +203,7 @@ def test_files_are_a_collection_for_all_estimators():
     expected = cross_val_score(pipe, list(X), cv=3)
     np.testing.assert_array_equal(cross_val_score(pipe, files, cv=3), expected)
     assert to_frame(files).equals(to_frame(X))
-    with pytest.raises(ValueError, match="Found 0 performances"):
+    with pytest.raises(ValueError, match="Found 0 trials"):
         DenseSynchronizer().fit(Files([]))
 
 
@@ -211,7 +211,7 @@ def test_files_are_a_collection_for_all_estimators():
 
 
 @pytest.mark.parametrize("settings", [{}, PAPER, {"pattern": X[3]}])
-def test_fit_to_a_sample_equals_a_fit_to_these_performances(settings):
+def test_fit_to_a_sample_equals_a_fit_to_these_trials(settings):
     files = Files(X)
     sync = DenseSynchronizer(max_fit=9, **settings).fit(files)
     sample = sync.sample_
@@ -230,8 +230,8 @@ def test_fit_to_a_sample_equals_a_fit_to_these_performances(settings):
         assert sync.pattern_.tobytes() == X[sync.pattern_index_].tobytes()
         np.testing.assert_array_equal(expected.sample_, np.arange(9))
     if expected.metric_:
-        learnt = sample[expected.metric_.performances]
-        np.testing.assert_array_equal(sync.metric_.performances, learnt)
+        learnt = sample[expected.metric_.trials]
+        np.testing.assert_array_equal(sync.metric_.trials, learnt)
 
 
 def test_sample_does_not_depend_on_the_kind_of_input():
@@ -257,7 +257,7 @@ def test_given_pattern_is_in_the_sample(pattern):
     sync = DenseSynchronizer(max_fit=5, pattern=pattern).fit(X)
     assert (sync.pattern_index_, len(sync.sample_)) == (pattern, 5)
     assert sync.pattern_.tobytes() == X[pattern].tobytes()
-    with pytest.raises(ValueError, match="pattern=16 is out of range: there are 16 performances"):
+    with pytest.raises(ValueError, match="pattern=16 is out of range: there are 16 trials"):
         DenseSynchronizer(max_fit=5, pattern=16).fit(X)
 
 
@@ -273,7 +273,7 @@ def test_only_the_sample_is_checked():
     spoilt[np.delete(np.arange(16), sample)] = np.nan
     DenseSynchronizer(max_fit=9).fit(spoilt)
     spoilt[sample[7], 3, 1] = np.inf
-    with pytest.raises(ValueError, match=f"Performance {sample[7]}, frame 3, feature 1"):
+    with pytest.raises(ValueError, match=f"Trial {sample[7]}, frame 3, feature 1"):
         DenseSynchronizer(max_fit=9).fit(spoilt)
 
 
@@ -281,6 +281,6 @@ def test_memory_limit_names_max_fit(monkeypatch):
     monkeypatch.setattr(training, "MOST_BYTES", 6 * X.size)
     with pytest.raises(ValueError, match="Or learn from some: max_fit=1000"):
         DenseSynchronizer().fit(X)
-    with pytest.raises(ValueError, match=r"or performances\.$"):
+    with pytest.raises(ValueError, match=r"or trials\.$"):
         LinearSynchronizer().fit(X)
     DenseSynchronizer(max_fit=9).fit(X)

@@ -45,11 +45,11 @@ def test_warp_takes_recordings_of_another_frame_rate(matched):
 
 def test_warp_refuses_other_sequences(matched):
     points, _, match = matched
-    with pytest.raises(ValueError, match="6 matched performances, but 5 sequences"):
+    with pytest.raises(ValueError, match="6 matched trials, but 5 sequences"):
         match.warp(points[:5])
-    with pytest.raises(ValueError, match="Performance 1 has 2 features a frame, performance 0 has"):
+    with pytest.raises(ValueError, match="Trial 1 has 2 features a frame, trial 0 has"):
         match.warp([points[0], np.zeros((9, 2)), *points[2:]])
-    with pytest.raises(ValueError, match=r"wrap|Wrap one performance as \[X\]"):
+    with pytest.raises(ValueError, match=r"wrap|Wrap one trial as \[X\]"):
         match.warp(np.zeros((6, 9)))
 
 
@@ -64,7 +64,7 @@ def test_match_unpacks_and_pickles(matched):
     copied = pickle.loads(pickle.dumps(match))
     for one, other in zip(copied, match, strict=True):
         np.testing.assert_array_equal(one, other)
-    assert repr(match) == "Match(6 performances on 40 frames)"
+    assert repr(match) == "Match(6 trials on 40 frames)"
 
 
 def test_frames_and_seconds(matched):
@@ -92,7 +92,7 @@ def test_tables_tell_their_frame_rate():
     recorded = pd.DataFrame({"knee": rng.normal(size=90).cumsum()})
     recorded.attrs["frame_rate"] = 120.0
     X, rates = [*tables, recorded, recorded.iloc[::2]], [50, 50, 50, 120, 60]
-    with pytest.warns(UserWarning, match="Performance 3 has 120 frames a second"):
+    with pytest.warns(UserWarning, match="Trial 3 has 120 frames a second"):
         match = LinearSynchronizer(20).fit(X).match(X)
     lengths = list(map(len, X))
     expected = match.to_frame("seconds", lengths, rates)
@@ -114,17 +114,17 @@ def test_tables_tell_their_frame_rate():
 @pytest.mark.parametrize(
     ("lengths", "rate", "message"),
     [
-        ([40] * 5, 1, "6 matched performances, but 5 lengths"),
-        ([40, 40, 1, 40, 40, 40], 1, "Performance 2 has 1 frame; give the performances"),
-        ([40, 40, 40, 40, 40.5, 40], 1, "Performance 4 has 40.5 frames"),
-        (np.zeros((6, 9)), 1, r"Wrap one performance .* \[X.shape\[1\]\] \* len\(X\)"),
+        ([40] * 5, 1, "6 matched trials, but 5 lengths"),
+        ([40, 40, 1, 40, 40, 40], 1, "Trial 2 has 1 frame; give the trials"),
+        ([40, 40, 40, 40, 40.5, 40], 1, "Trial 4 has 40.5 frames"),
+        (np.zeros((6, 9)), 1, r"Wrap one trial .* \[X.shape\[1\]\] \* len\(X\)"),
         ({"a": np.zeros((6, 9))}, 1, "got dict"),
         (map(len, ["ab"] * 6), 1, "got map"),
-        (5, 1, "A set of performances is .*got int"),
+        (5, 1, "A set of trials is .*got int"),
         ([40] * 6, 0, "frame_rate must be one number above 0"),
         ([40] * 6, np.nan, "frame_rate must be one number above 0"),
-        ([40] * 6, [1, 2, 3, np.inf, 5, 6], r"inf.*: performance 3\."),
-        ([40] * 6, [1, 2], "for each of the 6 performances"),
+        ([40] * 6, [1, 2, 3, np.inf, 5, 6], r"inf.*: trial 3\."),
+        ([40] * 6, [1, 2], "for each of the 6 trials"),
     ],
 )
 def test_seconds_refuses_invalid_lengths_and_rates(matched, lengths, rate, message):
@@ -137,10 +137,10 @@ def test_seconds_refuses_invalid_lengths_and_rates(matched, lengths, rate, messa
     [
         (np.zeros(5), None, r"got \(5,\)"),
         (np.zeros((5, 1)), None, "at least 2"),
-        ([[0.0, 1.0], [0.0, 1.5]], None, "Performance 1: .* 0 to P - 1 = 1, .* got 0 to 1.5"),
+        ([[0.0, 1.0], [0.0, 1.5]], None, "Trial 1: .* 0 to P - 1 = 1, .* got 0 to 1.5"),
         ([[0.0, 1.0]], ["near"], "distances is not a numeric array: got str, 'near'"),
         ([[0.0, np.nan]], None, "from 0 to P - 1"),
-        ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 performance, got shape \(2,\)"),
+        ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 trial, got shape \(2,\)"),
     ],
 )
 def test_match_refuses_invalid_times_and_distances(times, distances, message):
@@ -222,12 +222,12 @@ def late():
     return Match([np.interp(np.arange(11), [0, 5, 10], [0, peak, 10]) for peak in (7, 4)])
 
 
-def test_offsets_are_positive_where_a_performance_is_later(late):
+def test_offsets_are_positive_where_a_trial_is_later(late):
     peak = np.exp(-np.square(np.arange(11.0) - 5))[:, np.newaxis]
     slow = np.interp(np.arange(11), late.times[0], np.arange(11))
     X = [peak, np.interp(slow, np.arange(11), peak[:, 0])[:, np.newaxis]]
     assert X[1].argmax() == 7
-    found = DenseSynchronizer(pattern=0, consensus=0, cost="posture").fit(X).match(X)
+    found = DenseSynchronizer(pattern=0, consensus=0, cost="pose").fit(X).match(X)
     assert found.offsets[1, 5] > 1
     assert late.offsets[:, 5].tolist() == [2, -1]
 
@@ -250,9 +250,9 @@ def test_offsets_in_units(late):
         (lambda m: m.offsets_in("ms"), r"unit must be one of \['frames', .*got 'ms'"),
         (lambda m: m.offsets_in("seconds"), "needs X, .* and frame_rate"),
         (lambda m: m.offsets_in("seconds", frame_rate=5), "needs X, .* and frame_rate"),
-        (lambda m: m.offsets_in("seconds", [5], 5), "2 matched performances, but 1 length:"),
-        (lambda m: m.offsets_in("percent", [5]), "2 matched performances, but 1 length:"),
-        (lambda m: m.to_frame(labels=["a"]), "2 matched performances, but 1 label:"),
+        (lambda m: m.offsets_in("seconds", [5], 5), "2 matched trials, but 1 length:"),
+        (lambda m: m.offsets_in("percent", [5]), "2 matched trials, but 1 length:"),
+        (lambda m: m.to_frame(labels=["a"]), "2 matched trials, but 1 label:"),
         (lambda m: m.to_frame(labels=["a", "a"]), "2 different labels"),
         (lambda m: m.to_frame("hours"), "unit must be one of"),
     ],
@@ -275,9 +275,9 @@ def test_rates_are_the_slope_of_the_warp(late):
 
 
 def test_to_frame_gives_timing_with_labels(late):
-    X = to_frame([np.zeros((21, 1)), np.zeros((41, 1))], performances=["ann", "bob"])
+    X = to_frame([np.zeros((21, 1)), np.zeros((41, 1))], trials=["ann", "bob"])
     table = late.to_frame("seconds", X, frame_rate=[10, 40])
-    assert table.index.names == ["performance", "frame"]
+    assert table.index.names == ["trial", "frame"]
     assert list(table.index.unique(0)) == ["ann", "bob"]
     assert list(table.columns) == ["time", "offset", "rate"]
     np.testing.assert_allclose(table.loc[("bob", 5)], [0.4, -0.1, 1])

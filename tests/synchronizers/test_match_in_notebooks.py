@@ -49,8 +49,8 @@ def test_offsets_are_told_and_drawn():
 
 
 @pytest.mark.parametrize(("count", "shown"), [(0, 0), (1, 1), (10, 10), (25, 10)])
-def test_first_performances_are_shown(count, shown):
+def test_first_trials_are_shown(count, shown):
     page = Page(HTMLFormatter()(Match(np.tile([0.0, 1.0, 2.0], (count, 1)))))
     assert len(page.curves) == shown
     more = [text for text in page.texts if text.startswith("and ")]
-    assert more == (["and 15 performances more"] if count == 25 else [])
+    assert more == (["and 15 trials more"] if count == 25 else [])

@@ -8,7 +8,7 @@ from sklearn_motionsync import DenseSynchronizer
 
 @pytest.fixture(scope="module")
 def trials():
-    """Twelve performances of one movement of three features, each at a pace of its own."""
+    """Twelve trials of one movement of three features, each at a pace of its own."""
     rng, t = np.random.default_rng(0), np.linspace(0, 1, 60)
     X, phases = [], []
     for _ in range(12):
@@ -67,7 +67,7 @@ def test_common_noise_is_reliable(trials):
     [
         ({"metric": None}, 12),
         ({"consensus": 0}, 12),
-        ({"cost": "posture"}, 12),
+        ({"cost": "pose"}, 12),
         ({"cost": "elastic"}, 12),
         ({}, 2),
         ({}, 1),
@@ -75,7 +75,7 @@ def test_common_noise_is_reliable(trials):
     ids=str,
 )
 def test_no_metric_equals_metric_none(settings, n, trials):
-    """Off without a vote, for other costs, and for fewer than three performances."""
+    """Off without a vote, for other costs, and for fewer than three trials."""
     X = trials[0][:n]
     sync, plain = DenseSynchronizer(60, **settings), DenseSynchronizer(60, **settings)
     sync.fit(X)
@@ -98,11 +98,11 @@ def test_metric_of_many_is_learnt_from_twenty(trials):
     X = [x for x in trials[0] for _ in range(5)]
     rng = np.random.default_rng(0)
     X = [x + 0.01 * rng.standard_normal(x.shape) for x in X]
-    used = DenseSynchronizer(60).fit(X).metric_.performances
+    used = DenseSynchronizer(60).fit(X).metric_.trials
     assert len(used) == 20
     assert (used[0], used[-1]) == (0, 59)
     assert set(np.diff(used)) == {3, 4} or set(np.diff(used)) == {3}
-    np.testing.assert_array_equal(DenseSynchronizer(60).fit(X[:12]).metric_.performances, range(12))
+    np.testing.assert_array_equal(DenseSynchronizer(60).fit(X[:12]).metric_.trials, range(12))
 
 
 def test_single_precision_gives_the_same_metric(trials):

@@ -13,7 +13,7 @@ from sklearn_motionsync import (
     Skeleton,
     SynchronizationWarning,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import load_trials, make_bending
 
 PARTS = ["left arm", "right arm", "left leg", "right leg", "trunk"]
 ARMS = {name: Skeleton.paper().parts()[name] for name in ("right arm", "left arm")}
@@ -26,7 +26,7 @@ def lag_of(size, share):
 
 
 def delayed(x, columns, size):
-    """A performance, with features that come late."""
+    """A trial, with features that come late."""
     frames, out = np.arange(len(x)), x.copy()
     last = frames[-1]
     at = frames - lag_of(size, frames / last) * last / (P - 1)
@@ -46,27 +46,27 @@ def of_parts(parts=None, coupling=0.001, **settings):
     return PartSynchronizer(parts, coupling, DenseSynchronizer(**settings))
 
 
-def made_postures(count, seed):
+def made_poses(count, seed):
     bunch = make_bending(count, n_frames=60, random_state=seed)
     return DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
 
 
 def clips_of(real_data, action):
-    """Recorded clips of an action as postures, and their actors."""
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    """Recorded clips of an action as poses, and their actors."""
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     chosen = np.flatnonzero(bunch.target == action)
-    postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
-    return [x.astype(float) for x in postures], bunch.actor[chosen]
+    poses = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
+    return [x.astype(float) for x in poses], bunch.actor[chosen]
 
 
 @pytest.fixture(scope="module")
-def postures():
-    return made_postures(7, 0)
+def poses():
+    return made_poses(7, 0)
 
 
 @pytest.fixture(scope="module")
-def fitted(postures):
-    return of_parts(coupling=0, n_frames=60).fit(postures)
+def fitted(poses):
+    return of_parts(coupling=0, n_frames=60).fit(poses)
 
 
 @pytest.fixture(scope="module")
@@ -104,20 +104,20 @@ def test_warps_of_parts_come_nearer_with_the_coupling(grabs):
     assert np.max(apart[-2]) < 1e-6
 
 
-def test_lags_are_measured_without_coupling(postures):
+def test_lags_are_measured_without_coupling(poses):
     """An arm that is 5 % late is found as late, while its warp is drawn to the body."""
-    sync = {c: of_parts(coupling=c, n_frames=60).fit(postures) for c in (0, 0.1)}
-    late = [x.copy() for x in postures]
+    sync = {c: of_parts(coupling=c, n_frames=60).fit(poses) for c in (0, 0.1)}
+    late = [x.copy() for x in poses]
     for x in late:
         frames = np.arange(len(x))
         for k in sync[0].parts_["right arm"]:
             x[:, k] = np.interp(frames - 0.05 * frames[-1], frames, x[:, k])
     inner, found, warped = slice(6, -12), {}, {}
     for coupling, own in sync.items():
-        values = [own.lags(X, unit="percent") for X in (postures, late)]
+        values = [own.lags(X, unit="percent") for X in (poses, late)]
         arm = values[0].parts.index("right arm")
         found[coupling] = np.median((values[1].values - values[0].values)[:, arm, inner])
-        times = [own.match_parts(X)["right arm"].times for X in (postures, late)]
+        times = [own.match_parts(X)["right arm"].times for X in (poses, late)]
         warped[coupling] = np.median((times[1] - times[0])[:, inner]) * 100 / 59
     assert abs(found[0] - 5) < 0.6
     assert abs(found[0.1] - 5) < 0.6
@@ -126,7 +126,7 @@ def test_lags_are_measured_without_coupling(postures):
 
 def test_strong_coupling_follows_warps_steeper_than_a_path(real_data):
     """In clips of a few frames warps by way of others are steep and leave the band."""
-    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    bunch = load_trials(real_data / "utkinect" / "utkinect_positions.npz")
     chosen = np.flatnonzero(bunch.target == "walk")[::3]
     X = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
     trunk = {"trunk": Skeleton.paper().parts()["trunk"]}
@@ -140,12 +140,12 @@ def test_strong_coupling_follows_warps_steeper_than_a_path(real_data):
 
 
 @pytest.mark.parametrize("settings", [{}, {"consensus": 0}])
-def test_match_is_that_of_the_dense_synchronizer(postures, settings):
-    sync = of_parts(n_frames=40, **settings).fit(postures)
-    dense = DenseSynchronizer(40, **settings).fit(postures)
-    for own, other in zip(sync.match(postures), dense.match(postures), strict=True):
+def test_match_is_that_of_the_dense_synchronizer(poses, settings):
+    sync = of_parts(n_frames=40, **settings).fit(poses)
+    dense = DenseSynchronizer(40, **settings).fit(poses)
+    for own, other in zip(sync.match(poses), dense.match(poses), strict=True):
         np.testing.assert_array_equal(own, other)
-    assert sync.match_parts(postures).keys() == dict.fromkeys(PARTS).keys()
+    assert sync.match_parts(poses).keys() == dict.fromkeys(PARTS).keys()
 
 
 def test_parts_of_noise_are_learnt():
@@ -159,18 +159,18 @@ def test_parts_of_noise_are_learnt():
     assert np.isfinite(sync.lags(noise).values).all()
 
 
-def test_infinite_coupling_gives_one_warp_for_all_parts(postures):
+def test_infinite_coupling_gives_one_warp_for_all_parts(poses):
     sync = of_parts(coupling=np.inf, n_frames=40)
-    expected = DenseSynchronizer(40).fit_transform(postures)
-    np.testing.assert_array_equal(sync.fit_transform(postures), expected)
-    assert not sync.lags(postures).values.any()
+    expected = DenseSynchronizer(40).fit_transform(poses)
+    np.testing.assert_array_equal(sync.fit_transform(poses), expected)
+    assert not sync.lags(poses).values.any()
 
 
 def test_coupled_path_is_that_of_brute_force():
     """The path straight to the pattern, by the smallest sum over all paths, cell by cell."""
     rng, n, coupling = np.random.default_rng(0), 21, 2e-3
     X = list(np.cumsum(rng.normal(size=(2, n, 3)), axis=1))
-    settings = {"cost": "posture", "consensus": 0, "max_rate": 2, "smoothness": 0, "n_frames": n}
+    settings = {"cost": "pose", "consensus": 0, "max_rate": 2, "smoothness": 0, "n_frames": n}
     sync = of_parts({"a": [0, 1]}, coupling, pattern=0, **settings).fit(X)
     body = sync.match(X).offsets[1]
     part = np.array(X)[:, :, :2]
@@ -193,32 +193,32 @@ def test_coupled_path_is_that_of_brute_force():
     assert np.abs(found - row[n - 1][1]).mean() < 0.3
 
 
-def test_transform_samples_every_part_at_its_own_times(fitted, postures):
-    out, matches = fitted.transform(postures), fitted.match_parts(postures)
-    np.testing.assert_allclose(out[:, :, 0], fitted.match(postures).warp(postures)[:, :, 0])
+def test_transform_samples_every_part_at_its_own_times(fitted, poses):
+    out, matches = fitted.transform(poses), fitted.match_parts(poses)
+    np.testing.assert_allclose(out[:, :, 0], fitted.match(poses).warp(poses)[:, :, 0])
     for name, columns in fitted.parts_.items():
         own = np.stack(
             [
                 [np.interp(t * (len(x) - 1) / 59, np.arange(len(x)), x[:, k]) for k in columns]
-                for t, x in zip(matches[name].times, postures, strict=True)
+                for t, x in zip(matches[name].times, poses, strict=True)
             ]
         )
         np.testing.assert_allclose(out[:, :, columns], own.swapaxes(1, 2), atol=1e-12)
 
 
-def test_uncoupled_parts_are_independent(fitted, postures):
+def test_uncoupled_parts_are_independent(fitted, poses):
     """Only the pattern, the exemplars and the metric are common."""
-    shaken = [x.copy() for x in postures]
+    shaken = [x.copy() for x in poses]
     for x in shaken:
         x[:, fitted.parts_["trunk"]] = x[::-1, fitted.parts_["trunk"]]
-    before, after = fitted.match_parts(postures), fitted.match_parts(shaken)
+    before, after = fitted.match_parts(poses), fitted.match_parts(shaken)
     for name in PARTS[:-1]:
         np.testing.assert_array_equal(before[name].times, after[name].times)
     assert np.abs(before["trunk"].times - after["trunk"].times).max() > 1
 
 
-def test_parts_that_do_not_move_follow_the_body(postures):
-    X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in postures]
+def test_parts_that_do_not_move_follow_the_body(poses):
+    X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in poses]
     sync = of_parts({"still": [37], "arm": [25, 26, 27]}, 0, n_frames=40).fit(X)
     match = sync.match_parts(X)["still"]
     np.testing.assert_array_equal(match.times, sync.match(X).times)
@@ -226,12 +226,12 @@ def test_parts_that_do_not_move_follow_the_body(postures):
     assert np.isfinite(sync.transform(X)).all()
 
 
-def test_unit_and_jobs_do_not_change_a_part(fitted, postures):
-    scaled = [1024 * x for x in postures]
+def test_unit_and_jobs_do_not_change_a_part(fitted, poses):
+    scaled = [1024 * x for x in poses]
     sync = (
         clone(fitted).set_params(parts=Skeleton.paper().parts(), synchronizer__n_jobs=2).fit(scaled)
     )
-    for name, match in fitted.match_parts(postures).items():
+    for name, match in fitted.match_parts(poses).items():
         other = sync.match_parts(scaled)[name]
         np.testing.assert_array_equal(match.times, other.times)
         alone = sync.match_parts(scaled[2:3])[name]
@@ -241,15 +241,15 @@ def test_unit_and_jobs_do_not_change_a_part(fitted, postures):
 # -- features of parts -------------------------------------------------------------------
 
 
-def test_default_parts_are_recognised(fitted, postures):
+def test_default_parts_are_recognised(fitted, poses):
     by_skeleton = Skeleton.paper().parts()
     names = DirectionCosines(Skeleton.paper()).fit(make_bending(1).data).get_feature_names_out()
-    tables = [pd.DataFrame(x, columns=names) for x in postures]
+    tables = [pd.DataFrame(x, columns=names) for x in poses]
     by_name = of_parts(n_frames=40).fit(tables).parts_
     assert [*by_skeleton] == [*by_name] == [*fitted.parts_] == PARTS
     for name in PARTS:
         assert by_skeleton[name] == by_name[name].tolist() == fitted.parts_[name].tolist()
-    resampled = [np.float32(x[:-1] + x[1:]) / 2 for x in postures]
+    resampled = [np.float32(x[:-1] + x[1:]) / 2 for x in poses]
     assert [*of_parts(n_frames=40).fit(resampled).parts_] == PARTS
     limbs = {names[k].rsplit("_", 1)[0] for k in by_skeleton["left leg"]}
     assert limbs == {"left_thigh", "left_leg"}
@@ -281,9 +281,9 @@ def test_other_features_have_no_parts():
         ([1], "The 'parts' parameter of PartSynchronizer"),
     ],
 )
-def test_fit_refuses_invalid_parts(postures, parts, message):
+def test_fit_refuses_invalid_parts(poses, parts, message):
     with pytest.raises(ValueError, match=message):
-        PartSynchronizer(parts).fit(postures)
+        PartSynchronizer(parts).fit(poses)
 
 
 # -- reports of lags ---------------------------------------------------------------------
@@ -296,7 +296,7 @@ def offsets_from_mean(fitted, training, X):
 
 
 def test_lags_in_every_unit(fitted):
-    new = made_postures(4, 3)
+    new = made_poses(4, 3)
     lags = fitted.lags(new)
     assert lags.parts == [*PARTS]
     percent = fitted.lags(new, unit="percent").values
@@ -306,17 +306,17 @@ def test_lags_in_every_unit(fitted):
     np.testing.assert_allclose(seconds, percent / 100 * lasts / 30, atol=1e-9)
 
 
-def test_reference_is_a_least_absolute_fit(fitted, postures, real_data):
+def test_reference_is_a_least_absolute_fit(fitted, poses, real_data):
     """Of equally good ones the farthest from the mean; features of no part vote, too."""
     bends, _ = clips_of(real_data, "depositFloorR")
-    for X, new in ((postures, made_postures(4, 3)), (bends[:9], bends[12:15])):
+    for X, new in ((poses, made_poses(4, 3)), (bends[:9], bends[12:15])):
         left = np.setdiff1d(np.arange(37), np.concatenate([*fitted.parts_.values()]))
         sync = of_parts({**fitted.parts_, "left": left}, 0, n_frames=60).fit(X)
         own, taught = offsets_from_mean(sync, X, new), offsets_from_mean(sync, X, X)
         taught = np.stack([taught[name] for name in [*PARTS, "left"]])
         common = np.median(taught, axis=0)
         apart = min(np.abs(taught - common).mean() / np.abs(common).mean(), 1)
-        assert (apart < 0.2) == (X is postures)
+        assert (apart < 0.2) == (X is poses)
         values = of_parts(fitted.parts_, 0, n_frames=60).fit(X).lags(new).values
         for i, name in enumerate(PARTS):
             others = np.stack([own[other] for other in [*PARTS, "left"] if other != name])
@@ -329,7 +329,7 @@ def test_reference_is_a_least_absolute_fit(fitted, postures, real_data):
 
 
 def shifted(x, columns, share):
-    """A performance, with features that come late by this share of it; the first frame is held."""
+    """A trial, with features that come late by this share of it; the first frame is held."""
     frames, out = np.arange(len(x)), x.copy()
     for k in columns:
         out[:, k] = np.interp(frames - share * frames[-1], frames, x[:, k])
@@ -360,17 +360,17 @@ def test_shifted_parts_of_new_people_leave_the_others(real_data, action, late):
         assert np.median(error) < (0.6 if name in late else 0.5), name
 
 
-def test_delay_that_all_parts_share_is_no_lag(fitted, postures):
+def test_delay_that_all_parts_share_is_no_lag(fitted, poses):
     """Up to where a late end is cut off."""
-    late = [shifted(x, range(x.shape[1]), 0.05) for x in postures]
-    change = fitted.lags(late, unit="percent").values - fitted.lags(postures, unit="percent").values
-    own = fitted.match(late).offsets - fitted.match(postures).offsets
+    late = [shifted(x, range(x.shape[1]), 0.05) for x in poses]
+    change = fitted.lags(late, unit="percent").values - fitted.lags(poses, unit="percent").values
+    own = fitted.match(late).offsets - fitted.match(poses).offsets
     assert np.median(own[:, 10:50]) * 100 / 59 > 4
     assert np.median(np.abs(change[:, :, 10:50])) < 1
 
 
-def test_part_that_does_not_move_has_no_lag_and_is_no_reference(postures):
-    X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in postures]
+def test_part_that_does_not_move_has_no_lag_and_is_no_reference(poses):
+    X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in poses]
     arms = {"left": [22, 23, 24], "right": [25, 26, 27]}
     sync = of_parts({**arms, "still": [37]}, 0, n_frames=40).fit(X)
     without = of_parts({**arms}, 0, n_frames=40).fit(X)
@@ -404,10 +404,10 @@ def test_spread_within_and_between_subjects_agrees_with_scipy():
     assert summary.loc["leg", "mean"] == pytest.approx(table.loc["leg", "mean"].mean())
 
 
-def test_spread_is_nan_for_too_few_performances(fitted, postures):
-    summary = fitted.lags(postures, groups=list("abcdefg")).summary()
+def test_spread_is_nan_for_too_few_trials(fitted, poses):
+    summary = fitted.lags(poses, groups=list("abcdefg")).summary()
     assert summary[["sd_within", "sd_between", "icc"]].isna().all(axis=None)
     assert summary[["mean", "sd", "low", "high"]].notna().all(axis=None)
-    one = fitted.lags(postures[:1]).summary()
+    one = fitted.lags(poses[:1]).summary()
     assert one["mean"].notna().all()
     assert one[["sd", "low", "high"]].isna().all(axis=None)

@@ -1,4 +1,4 @@
-"""Properties of all synchronizers, on performances that hypothesis draws.
+"""Properties of all synchronizers, on trials that hypothesis draws.
 
 Invariances of warps; bounds are in frames, for rounding in double precision.
 """
@@ -13,7 +13,7 @@ from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
 # Waves of random sizes: one may be much larger than all others, with a warning.
 pytestmark = pytest.mark.filterwarnings("ignore:Feature .* of the energy:UserWarning")
 
-PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
+PAPER = {"cost": "pose", "max_rate": 2, "consensus": 0}
 SYNCHRONIZERS = [
     LinearSynchronizer(),
     DenseSynchronizer(),
@@ -27,7 +27,7 @@ ROUNDING = 1e-6
 
 
 @st.composite
-def performances(draw):
+def trials(draw):
     """A few smooth movements of one kind, each at its own pace, with noise or without."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     n, n_features = draw(st.integers(3, 6)), draw(st.integers(2, 4))
@@ -53,7 +53,7 @@ def assert_close(a, b, bound=ROUNDING):
 
 @every_synchronizer
 @few
-@given(performances(), st.floats(-1e3, 1e3))
+@given(trials(), st.floats(-1e3, 1e3))
 def test_warps_do_not_depend_on_the_origin(estimator, X, shift):
     offset = shift * np.arange(1, 1 + X[0].shape[1])
     assert_close(
@@ -63,7 +63,7 @@ def test_warps_do_not_depend_on_the_origin(estimator, X, shift):
 
 @every_synchronizer
 @few
-@given(performances(), st.floats(-5, 5), st.integers(-16, 16))
+@given(trials(), st.floats(-5, 5), st.integers(-16, 16))
 def test_warps_do_not_depend_on_the_unit(estimator, X, exponent, binary):
     """To the last bit if the units differ by a power of two."""
     expected = times(estimator, X)
@@ -81,7 +81,7 @@ def test_the_last_bits_of_a_metric_do_not_show_in_sharpened_warps(seed):
 
 @every_synchronizer
 @few
-@given(performances(), st.floats(-5, 5))
+@given(trials(), st.floats(-5, 5))
 def test_warps_hardly_depend_on_the_unit_in_single_precision(estimator, X, exponent):
     X = [x.astype(np.float32) for x in X]
     factor = np.float32(10.0**exponent)
@@ -93,8 +93,8 @@ def test_warps_hardly_depend_on_the_unit_in_single_precision(estimator, X, expon
 
 @every_synchronizer
 @few
-@given(performances(), st.randoms(use_true_random=False))
-def test_warps_do_not_depend_on_the_order_of_performances(estimator, X, random):
+@given(trials(), st.randoms(use_true_random=False))
+def test_warps_do_not_depend_on_the_order_of_trials(estimator, X, random):
     order = random.sample(range(len(X)), len(X))
     expected = times(estimator, X)[order]
     assert_close(times(estimator, [X[i] for i in order]), expected)
@@ -102,7 +102,7 @@ def test_warps_do_not_depend_on_the_order_of_performances(estimator, X, random):
 
 @every_synchronizer
 @few
-@given(performances(), st.randoms(use_true_random=False))
+@given(trials(), st.randoms(use_true_random=False))
 def test_warps_do_not_depend_on_the_order_of_features(estimator, X, random):
     order = random.sample(range(X[0].shape[1]), X[0].shape[1])
     assert_close(times(estimator, [x[:, order] for x in X]), times(estimator, X))
@@ -110,7 +110,7 @@ def test_warps_do_not_depend_on_the_order_of_features(estimator, X, random):
 
 @every_synchronizer
 @few
-@given(performances(), st.floats(-1e6, 1e6), st.integers(1, 30))
+@given(trials(), st.floats(-1e6, 1e6), st.integers(1, 30))
 def test_constant_features_change_no_warp(estimator, X, value, count):
     still = [np.hstack([x, np.full((len(x), count), value)]) for x in X]
     assert_close(times(estimator, still), times(estimator, X))
@@ -118,7 +118,7 @@ def test_constant_features_change_no_warp(estimator, X, value, count):
 
 @every_synchronizer
 @few
-@given(performances(), st.integers(0, 1), st.integers(1, 3))
+@given(trials(), st.integers(0, 1), st.integers(1, 3))
 def test_copies_of_features_change_no_warp(estimator, X, which, copies):
     if isinstance(estimator, LinearSynchronizer):
         copies, which = 1, slice(None)
@@ -128,7 +128,7 @@ def test_copies_of_features_change_no_warp(estimator, X, which, copies):
 
 @every_synchronizer
 @few
-@given(performances(), st.integers(2, 4))
+@given(trials(), st.integers(2, 4))
 def test_warps_do_not_depend_on_the_frame_rate(estimator, X, factor):
     def resampled(x):
         fine = np.linspace(0, len(x) - 1, factor * (len(x) - 1) + 1)

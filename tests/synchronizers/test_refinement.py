@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-from sklearn_motionsync.datasets import load_performances, make_gait
+from sklearn_motionsync.datasets import load_trials, make_gait
 from sklearn_motionsync.matching.filters import white_noise
 from sklearn_motionsync.matching.refinement import SAME_SOURCE, curvature, unexplained_variance
 
@@ -137,8 +137,8 @@ def assert_not_refined(X):
     assert sync.unexplained_variance_ > SAME_SOURCE
 
 
-def assert_not_refined_whatever_the_features(postures, counts=(None, 3, 2, 1)):
-    points = ASpace().fit_transform(postures)
+def assert_not_refined_whatever_the_features(poses, counts=(None, 3, 2, 1)):
+    points = ASpace().fit_transform(poses)
     for n_features in counts:
         assert_not_refined([x[:, :n_features] for x in points])
 
@@ -159,10 +159,10 @@ def test_people_are_not_refined(action, real_data):
 
     A single curve of one actor may be as alike as copies are.
     """
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
     chosen = np.flatnonzero(bunch.target == action)
-    postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
+    poses = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
     for actor in (None, "bd", "tr"):
-        mine = [x for x, i in zip(postures, chosen, strict=True) if actor in (None, bunch.actor[i])]
+        mine = [x for x, i in zip(poses, chosen, strict=True) if actor in (None, bunch.actor[i])]
         counts = (None, 2, 1) if actor is None else (None, 2)
         assert_not_refined_whatever_the_features(mine, counts)

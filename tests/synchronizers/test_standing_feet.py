@@ -11,9 +11,9 @@ from sklearn_motionsync import (
     DirectionCosines,
     Match,
     Skeleton,
-    blend_performances,
+    blend_trials,
 )
-from sklearn_motionsync.datasets import load_performances, make_walk
+from sklearn_motionsync.datasets import load_trials, make_walk
 
 from made_bodies import standing
 
@@ -71,7 +71,7 @@ def drift(x, joint, skeleton=PAPER, frames=slice(None)):
 @pytest.mark.parametrize("weights", [[0.5, 0.5], [0.8, 0.2], [1.5, -0.5], [[1, 0], [0, 1]]])
 def test_feet_that_stand_in_all_stand_in_the_blend(weights):
     X = [squat(0.4, 0.3, 0.2, 60), squat(0.15, 0.0, 0.5, 80, ahead=0.2)]
-    found = blend_performances(even(2), X, weights, skeleton=PAPER)
+    found = blend_trials(even(2), X, weights, skeleton=PAPER)
     # The transition ends 0.25 m from where it would without: as far as legs are moved.
     most = 0.004 if np.ndim(weights) == 1 else 0.02
     for side in SIDES:
@@ -85,26 +85,24 @@ def test_a_nearly_straight_knee_comes_back_as_it_is():
     x = np.repeat(standing(), 60, axis=0)
     x[:, 3 * PAPER.index_of("left_knee") + 2] += 1e-8
     X = [x, squat(0.3, 0.2, 0.3)]
-    found = blend_performances(even(2), X, {0: 1}, skeleton=PAPER)
+    found = blend_trials(even(2), X, {0: 1}, skeleton=PAPER)
     np.testing.assert_allclose(found, x, atol=1e-15, rtol=0)
 
 
 @pytest.mark.parametrize("i", [0, 1])
 def test_nothing_moves_at_a_weight_of_one_or_near_it(i):
     X = [squat(0.4, 0.3, 0.2), squat(0.15, 0.0, 0.5, ahead=0.2)]
-    np.testing.assert_allclose(
-        blend_performances(even(2), X, {i: 1}, skeleton=PAPER), X[i], atol=1e-12
-    )
+    np.testing.assert_allclose(blend_trials(even(2), X, {i: 1}, skeleton=PAPER), X[i], atol=1e-12)
     for little in (1e-6, -1e-6):
-        found = blend_performances(even(2), X, {i: 1 - little, 1 - i: little}, skeleton=PAPER)
+        found = blend_trials(even(2), X, {i: 1 - little, 1 - i: little}, skeleton=PAPER)
         np.testing.assert_allclose(found, X[i], atol=1e-4)
 
 
 def test_bodies_go_through_straight_knees():
-    """Legs that are straight in one performance, and as near to it as it gets."""
+    """Legs that are straight in one trial, and as near to it as it gets."""
     x = np.repeat(standing(), 60, axis=0)
     X = [x, squat(0.3, 0.2, 0.3)]
-    found = blend_performances(even(2), X, [0.6, 0.4], skeleton=PAPER)
+    found = blend_trials(even(2), X, [0.6, 0.4], skeleton=PAPER)
     np.testing.assert_allclose(limbs(found), 0.5, atol=1e-9)
     assert np.abs(np.diff(found, axis=0)).max() < 0.05
     # They bend forward.
@@ -131,7 +129,7 @@ def stances(walk, i, side, rate=100):
 
 
 def of_blend(match, X, i, j, weights, n, ranges):
-    """The frames of a blend at frames of its first performance."""
+    """The frames of a blend at frames of its first trial."""
     own = Match(match.times[[i, j]]).frames([len(X[i]), len(X[j])])
     steps = np.maximum(weights @ np.diff(own, axis=1), 0.5 * np.diff(own, axis=1).min(axis=0))
     passed = np.concatenate([[0], np.cumsum(steps)])
@@ -144,9 +142,7 @@ def test_feet_of_exaggerated_walks_stand():
     largest = []
     for i, j in ((0, 2), (2, 0), (1, 3), (3, 1)):
         X = [walk.data[i], walk.data[j]]
-        found = blend_performances(
-            Match(match.times[[i, j]]), X, [1.5, -0.5], skeleton=walk.skeleton
-        )
+        found = blend_trials(Match(match.times[[i, j]]), X, [1.5, -0.5], skeleton=walk.skeleton)
         for side in SIDES:
             ranges = stances(walk, i, side)
             for frames in of_blend(
@@ -162,7 +158,7 @@ def test_feet_on_a_treadmill_go_with_the_belt():
     i, j = 1, 2
     X = [walk.data[i], walk.data[j]]
     for weights in ([0.5, 0.5], [1.5, -0.5]):
-        found = blend_performances(Match(match.times[[i, j]]), X, weights, skeleton=walk.skeleton)
+        found = blend_trials(Match(match.times[[i, j]]), X, weights, skeleton=walk.skeleton)
         own = [at(x, "pelvis", walk.skeleton) for x in [*X, found]]
         # The body is not carried off.
         assert np.ptp(own[2][:, [0, 2]], axis=0).max() < 2 * np.ptp(own[0], axis=0).max()
@@ -182,7 +178,7 @@ def test_feet_in_the_air_are_left_alone():
     flies = up > 0.3
     for x in X:
         x[:, 1::3] += up[:, np.newaxis]
-    found = blend_performances(even(2), X, [0.5, 0.5], skeleton=PAPER)
+    found = blend_trials(even(2), X, [0.5, 0.5], skeleton=PAPER)
     mean = [np.mean([at(x, f"{s}_ankle")[:, 1] for x in X], axis=0) for s in SIDES]
     for side, expected in zip(SIDES, mean, strict=True):
         height = at(found, f"{side}_ankle")[:, 1]
@@ -193,7 +189,7 @@ def test_feet_in_the_air_are_left_alone():
 def test_soles_stay_above_the_floor():
     walk, match = walks(treadmill=False)
     for i, j in ((0, 2), (2, 0)):
-        found = blend_performances(
+        found = blend_trials(
             Match(match.times[[i, j]]),
             [walk.data[i], walk.data[j]],
             [1.5, -0.5],
@@ -211,7 +207,7 @@ def test_bodies_in_pictures_are_blended_as_before():
     picture = Skeleton.paper(n_dims=2, up="y")
     X = [squat(0.4, 0.3, 0.2), squat(0.15, 0.0, 0.5)]
     flat = [x.reshape(len(x), -1, 3)[..., [2, 1]].reshape(len(x), -1) for x in X]
-    found = blend_performances(even(2), flat, [1.5, -0.5], skeleton=picture)
+    found = blend_trials(even(2), flat, [1.5, -0.5], skeleton=picture)
     # Sideways, feet slide.
     assert np.ptp(at(found, "left_ankle", picture)[:, 0]) > 0.02
 
@@ -222,9 +218,9 @@ def test_one_leg_and_no_knees():
     skeleton = Skeleton(joints, [-1, 0, 1, 2, 0, 4, 0], {name: name for name in joints})
     X = [squat(0.4, 0.3, 0.2), squat(0.15, 0.0, 0.5)]
     X = [x.reshape(len(x), -1, 3)[:, whole].reshape(len(x), -1) for x in X]
-    found = blend_performances(even(2), X, [0.5, 0.5], skeleton=skeleton)
+    found = blend_trials(even(2), X, [0.5, 0.5], skeleton=skeleton)
     assert drift(found, "left_ankle", skeleton) < 0.004
-    back = blend_performances(even(2), X, [0, 1], skeleton=skeleton)
+    back = blend_trials(even(2), X, [0, 1], skeleton=skeleton)
     np.testing.assert_allclose(back, X[1], atol=1e-9)
 
 
@@ -240,7 +236,7 @@ def test_heels_and_toes_without_parents_go_with_the_ankle():
             for shift in ([0, -0.05, -0.06], [0, -0.05, 0.15])
         ]
         X.append(np.column_stack([x, *ends]))
-    found = blend_performances(even(2), X, [1.5, -0.5], skeleton=skeleton)
+    found = blend_trials(even(2), X, [1.5, -0.5], skeleton=skeleton)
     joints = found.reshape(len(found), -1, 3)
     for side in SIDES:
         for end, shift in (("heel", [0, -0.05, -0.06]), ("toe", [0, -0.05, 0.15])):
@@ -251,14 +247,14 @@ def test_heels_and_toes_without_parents_go_with_the_ankle():
 def test_recorded_walks_stand_as_they_do_themselves(real_data):
     """These takes slip by 1.6 cm a stance. Blends did by 4.0, and by 41 at worst."""
     folder = real_data / "cmu07_walk" / "cmu07_walk_positions.npz"
-    takes = load_performances(folder)
+    takes = load_trials(folder)
     X, skeleton = [np.asarray(x, dtype=float) for x in takes.data], takes.skeleton
     steps = DirectionCosines(skeleton), ASpace(0.95), DenseSynchronizer(n_frames=120)
     match = Match.from_estimator(make_pipeline(*steps).fit(X), X)
     slips, own = [], []
     for i, j in ((3, 5), (7, 1), (3, 1), (2, 1), (4, 0)):
         pair, both = [X[i], X[j]], Match(match.times[[i, j]])
-        found = blend_performances(both, pair, [1.5, -0.5], skeleton=skeleton)
+        found = blend_trials(both, pair, [1.5, -0.5], skeleton=skeleton)
         for side in SIDES:
             place = at(X[i], f"{side}_ankle", skeleton)
             speed = np.linalg.norm(np.gradient(place[:, [0, 2]], axis=0), axis=1) * 60

@@ -137,10 +137,10 @@ def test_scorers_displays_and_searches_find_the_synchronizer(bunch):
         assert scorer(pipe, X) == scorer(plain, X)
     one, other = (SynchronizationDisplay.from_estimator(p, X) for p in (pipe, plain))
     np.testing.assert_array_equal(one.after, other.after)
-    one, other = (TrellisDisplay.from_estimator(p, X, performance=1) for p in (pipe, plain))
+    one, other = (TrellisDisplay.from_estimator(p, X, trial=1) for p in (pipe, plain))
     np.testing.assert_array_equal(one.space.costs, other.space.costs)
     assert len(SkeletonDisplay.from_model(pipe, frames=[5]).axes_) == 2
-    assert len(SkeletonDisplay.from_departures(pipe, X, performance=1, frames=2).axes_) == 2
+    assert len(SkeletonDisplay.from_departures(pipe, X, trial=1, frames=2).axes_) == 2
     detector = ActionDetector(pipe).fit(X)
     assert (detector.predict(X) == 1).all()
     search = GridSearchCV(
@@ -149,34 +149,32 @@ def test_scorers_displays_and_searches_find_the_synchronizer(bunch):
     assert search.fit(X).best_params_ == {"timingchannel__synchronizer__max_offset": 0.25}
 
 
-def test_model_displays_show_the_channel_beside_postures(bunch):
+def test_model_displays_show_the_channel_beside_poses(bunch):
     pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
     display = ActionModelDisplay.from_estimator(pipe, bunch.data)
     assert display.ylabels == ["aspace0", "aspace1", "aspace2", "offset"]
     features = ["offset", "pelvis_height"]
     plain = steps(bunch, DenseSynchronizer(30), ActionModel()).fit(bunch.data)
-    for band in ("points", "performances"):
+    for band in ("points", "trials"):
         display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features, band=band)
         offsets = Match.from_estimator(pipe, bunch.data).offsets_in("percent")
-        np.testing.assert_allclose(display.performances[:, :, 0], offsets)
+        np.testing.assert_allclose(display.trials[:, :, 0], offsets)
         np.testing.assert_allclose(display.mean[:, 0], offsets.mean(axis=0))
         expected = ActionModelDisplay.from_estimator(
             plain, bunch.data, features="pelvis_height", band=band
         )
-        np.testing.assert_allclose(display.performances[:, :, 1:], expected.performances)
+        np.testing.assert_allclose(display.trials[:, :, 1:], expected.trials)
     # A limb varies by what the aSpace leaves out, too; the channel does not.
     strange = [*bunch.data[:2], bunch.data[2][::-1]]
     found = find_departures(pipe, strange, features="offset", limit=0.1)
     assert set(found["feature"]) == {"offset"}
-    found = found.groupby("performance").head(1)
+    found = found.groupby("trial").head(1)
     deviations = (pipe[:-1].transform(strange) - pipe[-1].mean_)[:, :, -1]
     scores = deviations / np.sqrt(pipe[-1].predictive_variance_[:, -1])
-    inside = [
-        np.abs(scores[row.performance, row.first : row.last + 1]) for row in found.itertuples()
-    ]
+    inside = [np.abs(scores[row.trial, row.first : row.last + 1]) for row in found.itertuples()]
     peaks = [row.first + x.argmax() for row, x in zip(found.itertuples(), inside, strict=True)]
     assert found["peak"].tolist() == peaks
-    assert set(found["performance"]) == {0, 1, 2}
+    assert set(found["trial"]) == {0, 1, 2}
 
 
 @pytest.mark.parametrize(
@@ -272,7 +270,7 @@ def test_errors_of_parts_are_those_of_the_whole_body(points):
 
 
 def group_of_trials(seed):
-    """A template, 12 trials later than it, a third of them under much noise, and true offsets.
+    """A pattern, 12 trials later than it, a third of them under much noise, and true offsets.
 
     Trials are 5 % late in the middle.
     """

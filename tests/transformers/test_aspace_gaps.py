@@ -1,4 +1,4 @@
-"""Postures with gaps in the aSpace, against conditional normal distributions written out."""
+"""Poses with gaps in the aSpace, against conditional normal distributions written out."""
 
 from contextlib import nullcontext
 
@@ -10,13 +10,13 @@ from sklearn_motionsync import ASpace, DirectionCosines
 from sklearn_motionsync.matching.gaps import SHRINKAGE, Filler
 
 
-def low_rank(n_performances, n_frames=60, rank=2, n_features=6, noise=0.01, seed=0):
-    """Smooth performances of few dimensions, and a little noise."""
+def low_rank(n_trials, n_frames=60, rank=2, n_features=6, noise=0.01, seed=0):
+    """Smooth trials of few dimensions, and a little noise."""
     rng = np.random.default_rng(seed)
     mixing = np.random.default_rng(99).standard_normal((rank, n_features))
     t = np.linspace(0, 1, n_frames)[:, np.newaxis]
     X = []
-    for _ in range(n_performances):
+    for _ in range(n_trials):
         phase, pace = rng.uniform(0, 6, rank), rng.uniform(3, 9, rank)
         x = np.sin(pace * t + phase) @ mixing + 5
         X.append(x + noise * rng.standard_normal(x.shape))
@@ -56,7 +56,7 @@ def conditional(x, mean, covariance):
 
 
 def test_components_are_those_of_the_covariance_of_what_was_seen():
-    """Every covariance is that of the postures that show both features, by pandas."""
+    """Every covariance is that of the poses that show both features, by pandas."""
     X = hide(low_rank(3, n_features=5, noise=0.3), 0.2)
     rows = np.concatenate(X)
     aspace = ASpace(1.0).fit(X)
@@ -106,7 +106,7 @@ def test_without_gaps_nothing_is_estimated_otherwise(monkeypatch):
 
 
 @pytest.mark.parametrize("fitted_on", ["whole", "gaps"])
-def test_rows_are_the_conditional_expectation_of_each_posture(fitted_on):
+def test_rows_are_the_conditional_expectation_of_each_pose(fitted_on):
     X = low_rank(4)
     gaps = hide(X, 0.3)
     rows = np.concatenate(X if fitted_on == "whole" else gaps)
@@ -157,7 +157,7 @@ def test_hidden_values_of_a_known_process_are_found():
     assert found < 0.15 * error(means)
 
 
-def test_results_of_a_performance_depend_on_no_other():
+def test_results_of_a_trial_depend_on_no_other():
     X = hide(low_rank(5), 0.2, run=4)
     aspace = ASpace(2).fit(X)
     together = aspace.transform(X)
@@ -176,17 +176,17 @@ def test_a_limb_of_people_that_is_hidden_for_a_second(bends):
         for k in joints:
             gaps[i][100:220, k : k + 3] = np.nan
     cosines = DirectionCosines(bends.skeleton, hidden="nan").fit(gaps)
-    truth, postures = cosines.transform(bends.data), cosines.transform(gaps)
-    hidden = np.isnan(np.concatenate(postures))
+    truth, poses = cosines.transform(bends.data), cosines.transform(gaps)
+    hidden = np.isnan(np.concatenate(poses))
 
     def error(filled):
         return np.sqrt(np.square(np.concatenate(filled) - np.concatenate(truth))[hidden].mean())
 
-    aspace = ASpace(1.0).fit(postures)
-    found = error(aspace.inverse_transform(aspace.transform(postures)))
-    rows = [aspace.transform(x) for x in postures]
-    lines = [pd.DataFrame(x).interpolate().to_numpy() for x in postures]
-    means = [np.where(np.isnan(x), aspace.mean_, x) for x in postures]
+    aspace = ASpace(1.0).fit(poses)
+    found = error(aspace.inverse_transform(aspace.transform(poses)))
+    rows = [aspace.transform(x) for x in poses]
+    lines = [pd.DataFrame(x).interpolate().to_numpy() for x in poses]
+    means = [np.where(np.isnan(x), aspace.mean_, x) for x in poses]
     assert found < 0.9 * error(lines)
     assert found < 0.6 * error(means)
     assert found < 0.8 * error(aspace.inverse_transform(rows))
@@ -195,7 +195,7 @@ def test_a_limb_of_people_that_is_hidden_for_a_second(bends):
 # -- what is missing, and what is refused -------------------------------------------------
 
 
-def test_missing_is_the_share_of_the_postures():
+def test_missing_is_the_share_of_the_poses():
     X = [x.copy() for x in low_rank(2, n_frames=50)]
     X[0][:20, 3] = np.nan
     X[1][7] = np.nan
@@ -216,7 +216,7 @@ def test_a_feature_that_was_never_seen_is_refused_by_its_name(named):
         ASpace().fit(X)
     X = [np.array(x) for x in X]
     X[1][9, 4] = 5
-    with pytest.raises(ValueError, match="Feature 4 was seen in one posture only"):
+    with pytest.raises(ValueError, match="Feature 4 was seen in one pose only"):
         ASpace().fit(X)
 
 
@@ -226,7 +226,7 @@ def test_a_feature_that_was_hardly_ever_seen_is_warned_of():
     for x in X[1:]:
         x[:, 4] = np.nan
     X[0][5:, 4] = np.nan
-    with pytest.warns(UserWarning, match="Feature 4 was seen in 5 postures of 18, and a"):
+    with pytest.warns(UserWarning, match="Feature 4 was seen in 5 poses of 18, and a"):
         ASpace().fit(X)
     X[0][5, 4] = whole[0][5, 4]
     ASpace().fit(X)
@@ -243,13 +243,11 @@ def test_variances_of_what_is_hidden_at_random_are_not_biased():
 
 
 @pytest.mark.parametrize("n", [2, 5])
-def test_constant_features_and_few_postures(n):
+def test_constant_features_and_few_poses(n):
     X = [np.column_stack([x[:n], np.full(n, 3.0)]) for x in low_rank(2, noise=0.3)]
     gaps = [x.copy() for x in X]
     gaps[0][0, 6] = gaps[0][0, 1] = gaps[1][1, 2] = np.nan
-    with (
-        pytest.warns(UserWarning, match="fewer postures than features") if n == 2 else nullcontext()
-    ):
+    with pytest.warns(UserWarning, match="fewer poses than features") if n == 2 else nullcontext():
         aspace = ASpace(1.0).fit(gaps)
     back = aspace.inverse_transform(aspace.transform(gaps))
     np.testing.assert_allclose(back[0][:, 6], 3, atol=1e-9)
@@ -261,7 +259,7 @@ def test_constant_features_and_few_postures(n):
 # -- input and output ---------------------------------------------------------------------
 
 
-def test_nan_points_become_nan_postures():
+def test_nan_points_become_nan_poses():
     aspace = ASpace(2).fit(low_rank(3))
     points = aspace.transform(low_rank(1))
     points[0][3, 1] = np.nan

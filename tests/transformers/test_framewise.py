@@ -1,4 +1,4 @@
-"""FrameWise: transformers of rows, applied to frames of performances."""
+"""FrameWise: transformers of rows, applied to frames of trials."""
 
 import numpy as np
 import pandas as pd
@@ -26,7 +26,7 @@ from sklearn_motionsync import (
     FrameWise,
     find_departures,
     to_frame,
-    to_sequences,
+    to_trials,
 )
 from sklearn_motionsync.display import SkeletonDisplay
 
@@ -105,7 +105,7 @@ def test_inverse_transform_gives_the_input(X, frames):
         points = framewise.transform(frames)
         back = framewise.inverse_transform(points)
         assert list(back.columns) == NAMES
-        np.testing.assert_allclose(np.stack(to_sequences(back)), X, atol=1e-9)
+        np.testing.assert_allclose(np.stack(to_trials(back)), X, atol=1e-9)
         with pytest.raises(ValueError, match="should match"):
             framewise.inverse_transform(points[points.columns[::-1]])
 
@@ -142,7 +142,7 @@ def test_gaps_pass_to_transformers_that_accept_them(transformer, X):
     for given in (gaps, np.stack(gaps), to_frame(gaps)):
         assert np.isfinite(np.stack(FrameWise(transformer).fit_transform(given))).all()
     assert np.isnan(FrameWise(StandardScaler()).fit_transform(gaps)[2]).sum() == 1
-    with pytest.raises(ValueError, match="Performance 2, frame 5, feature 1 is infinity"):
+    with pytest.raises(ValueError, match="Trial 2, frame 5, feature 1 is infinity"):
         FrameWise(transformer).fit(with_gap(X, np.inf))
 
 
@@ -156,7 +156,7 @@ def test_gaps_pass_to_transformers_that_accept_them(transformer, X):
     ids=str,
 )
 def test_gaps_are_refused_where_a_step_does_not_accept_them(estimator, X):
-    with pytest.raises(ValueError, match="Performance 2, frame 5, feature 1 is NaN"):
+    with pytest.raises(ValueError, match="Trial 2, frame 5, feature 1 is NaN"):
         estimator.fit(with_gap(X))
 
 
@@ -175,10 +175,10 @@ def test_input_is_not_written_to(X):
         (RandomForestClassifier(), ["'transformer'", "'transform'"]),
         (
             FunctionTransformer(lambda x: x[::2]),
-            ["Performance 0 has 30 frames", "(15, 3)", "change"],
+            ["Trial 0 has 30 frames", "(15, 3)", "change"],
         ),
-        (FunctionTransformer(lambda x: x[:, 0]), ["Performance 0", "(30,)"]),
-        (FunctionTransformer(lambda x: x.astype(str)), ["Performance 0", "FunctionTransformer"]),
+        (FunctionTransformer(lambda x: x[:, 0]), ["Trial 0", "(30,)"]),
+        (FunctionTransformer(lambda x: x.astype(str)), ["Trial 0", "FunctionTransformer"]),
         (OneHotEncoder(handle_unknown="ignore"), ["OneHotEncoder", "sparse_output=False"]),
         ("scale", ["'transformer'", "'scale'"]),
     ],
@@ -192,7 +192,7 @@ def test_fit_refuses_transformers(transformer, words, X):
     assert not hasattr(framewise, "transformer_")
 
 
-def test_departures_and_figures_show_postures_before_scaling(bending):
+def test_departures_and_figures_show_poses_before_scaling(bending):
     cosines, data = DirectionCosines(bending.skeleton), bending.data[:8]
     steps = ASpace(), DenseSynchronizer(30), ActionModel()
     plain = make_pipeline(cosines, *steps).fit(data)
@@ -202,7 +202,7 @@ def test_departures_and_figures_show_postures_before_scaling(bending):
     assert found[1] <= set(plain[0].get_feature_names_out())
     assert found[0] & found[1]
     displays = [
-        SkeletonDisplay.from_departures(pipe, data, performance=1, frames=[0, 29]) for pipe in pipes
+        SkeletonDisplay.from_departures(pipe, data, trial=1, frames=[0, 29]) for pipe in pipes
     ]
     bodies = [np.concatenate([x for scene in d.scenes for x in scene]) for d in displays]
     np.testing.assert_allclose(*bodies, atol=0.15)

@@ -21,7 +21,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_bending
 
-from estimators import EVERY, WHOLE, by_name, data_for, make_performances, outputs
+from estimators import EVERY, WHOLE, by_name, data_for, make_trials, outputs
 
 pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
 
@@ -139,7 +139,7 @@ NESTED = [
 
 @pytest.mark.parametrize(("estimator", "within", "stage"), NESTED, ids=by_name)
 def test_callbacks_reach_what_is_fitted_within(estimator, within, stage):
-    X, recorder = make_performances(6), Propagating()
+    X, recorder = make_trials(6), Propagating()
     watched = clone(estimator).set_callbacks(recorder).fit(X)
     begun = [context for hook, context in recorder.contexts if hook == "begin"]
     (inner,) = [c for c in begun if c.estimator_name == within and c.task_name == "fit"]
@@ -159,7 +159,7 @@ def test_callbacks_reach_what_is_fitted_within(estimator, within, stage):
 def test_a_callback_reaches_the_steps_of_a_detector():
     recorder = Propagating()
     detector = ActionDetector(make_pipeline(DENSE, ActionModel())).set_callbacks(recorder)
-    detector.fit(make_performances(6))
+    detector.fit(make_trials(6))
     names = {context.estimator_name for _, context in recorder.contexts}
     assert names == {"ActionDetector", "Pipeline", "DenseSynchronizer", "ActionModel"}
 
@@ -168,13 +168,13 @@ def test_all_steps_of_a_pipeline_take_callbacks():
     """A step that does not is warned of, and warnings are errors."""
     steps = DirectionCosines(Skeleton.paper()), ASpace(3), LinearSynchronizer(), ActionModel()
     recorder = Propagating()
-    make_pipeline(*steps).set_callbacks(recorder).fit(make_performances(6))
+    make_pipeline(*steps).set_callbacks(recorder).fit(make_trials(6))
     names = {context.estimator_name for _, context in recorder.contexts}
     assert names == {"Pipeline", *(type(step).__name__ for step in steps)}
 
 
 def test_a_transformer_without_callbacks_is_a_task_like_any_other():
     recorder = Propagating()
-    FrameWise(FunctionTransformer()).set_callbacks(recorder).fit(make_performances(3))
+    FrameWise(FunctionTransformer()).set_callbacks(recorder).fit(make_trials(3))
     tasks = [context.task_name for hook, context in recorder.contexts if hook == "end"]
     assert tasks == ["fitting the transformer", "fit"]

@@ -106,7 +106,7 @@ def bits(sync, X):
 
 
 @pytest.mark.parametrize("shape", [(100, 40, 48), (300, 40, 16)], ids=["all pairs", "drawn ones"])
-def test_fit_sends_performances_to_every_worker_once(client, shape):
+def test_fit_sends_trials_to_every_worker_once(client, shape):
     X = walks(*shape)
     expected = bits(DenseSynchronizer().fit(X), X)
     with distributed.get_task_stream(client), joblib.parallel_config(backend="dask"):
@@ -146,7 +146,7 @@ def test_busy_workers_keep_no_data_after_a_fit(client):
     wait_until(lambda: not any(client.run(has_data).values()))
 
 
-def test_warping_sends_every_performance_to_one_worker(client):
+def test_warping_sends_every_trial_to_one_worker(client):
     X = walks(100, 60, 8)
     many = np.concatenate([X] * 6)
     sync = DenseSynchronizer().fit(X)
@@ -270,7 +270,7 @@ def test_files_are_read_by_workers(client, files, portions_of_walks, expected):
 def test_files_are_sent_by_the_script(client, files, expected, capsys):
     np.save(files[1] / "4.npy", np.full((2, 60, 8), np.nan))
     arguments = [*map(str, files), "--scheduler", client.scheduler.address]
-    assert re.match(r".*4\.npy: Performance 0.*NaN", stream_dask.main(arguments), re.DOTALL)
+    assert re.match(r".*4\.npy: Trial 0.*NaN", stream_dask.main(arguments), re.DOTALL)
     assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
     assert_warped(files[2], expected)
     (files[1] / "4.npy").unlink()

@@ -21,7 +21,7 @@ from sklearn_motionsync import (
     compare_to_norm,
     datasets,
     display,
-    find_performances,
+    find_trials,
     io,
     metrics,
     write_report,
@@ -51,7 +51,7 @@ def report(**given):
         write_report(Path(folder) / "report.html", SYNC, X, **given)
 
 
-# What each method does with groups of the N performances; whether it needs two of them.
+# What each method does with groups of the N trials; whether it needs two of them.
 METHODS = {
     "ActionModel.fit(groups)": (lambda g: ActionModel().fit(X, groups=g), True),
     "ActionModel.partial_fit(groups)": (lambda g: ActionModel().partial_fit(X, groups=g), False),
@@ -91,7 +91,7 @@ METHODS = {
     ),
     "write_report(groups)": (lambda g: report(groups=g), True),
     "write_report(people)": (lambda p: report(people=p), False),
-    "find_performances(groups)": (lambda g: find_performances(SYNC, X[0], groups=g), True),
+    "find_trials(groups)": (lambda g: find_trials(SYNC, X[0], groups=g), True),
     "LagDisplay.from_estimator(groups)": (
         lambda g: LagDisplay.from_estimator(PARTS, X, groups=g),
         False,
@@ -111,7 +111,7 @@ REFUSED = [
     (pd.to_datetime(["2020-01-01"] * 4 + [None] * 2), r"\[4\] is missing, NaT"),
     (pd.Series([1, 2, None] * 2, dtype="Int64"), r"\[2\] is missing, <NA>"),
     ([1, 2, 3, "b", 5, 6], r"\[3\] is 'b', {0}\[0\] is 1: labels must be of one type"),
-    (list("abcde"), "{0} must have one label for each performance, got 5 for 6"),
+    (list("abcde"), "{0} must have one label for each trial, got 5 for 6"),
     ("abcdef", "{0} must be a list or 1-D array .* got 'abcdef'"),
     (dict.fromkeys(range(6)), "{0} must be a list or 1-D array .* got {{"),
     (set(range(6)), "{0} must be a list or 1-D array .* got {{"),
@@ -150,7 +150,7 @@ def test_every_public_method_with_groups_is_tested():
 
 
 @pytest.mark.parametrize(("labels", "message"), REFUSED)
-def test_what_is_no_label_for_each_performance_is_refused(labels, message):
+def test_what_is_no_label_for_each_trial_is_refused(labels, message):
     with pytest.raises(ValueError, match=message.format("people")):
         encode_groups(labels, N, name="people")
     # The shape of y is checked as in scikit-learn.

@@ -24,7 +24,7 @@ from sklearn_motionsync.utils.parallel import Progress, run
 pytestmark = pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 
 SETTINGS = {
-    "paper": {"cost": "posture", "max_rate": 2, "consensus": 0},
+    "paper": {"cost": "pose", "max_rate": 2, "consensus": 0},
     "defaults": {},
     "refined": {"refine": True, "consensus": 3},
 }
@@ -32,7 +32,7 @@ SETTINGS = {
 
 @pytest.fixture(scope="module")
 def walks():
-    """300 performances, whose fit and warps take several portions."""
+    """300 trials, whose fit and warps take several portions."""
     rng = np.random.default_rng(0)
     return [np.cumsum(rng.standard_normal((n, 3)), axis=0) for n in rng.integers(16, 20, size=300)]
 
@@ -147,7 +147,7 @@ def test_verbose_prints_the_progress_of_stages(walks, capsys, monkeypatch):
     DenseSynchronizer(verbose=1).fit(walks).transform(walks)
     lines = capsys.readouterr().out.splitlines()
     assert all(line.startswith("[DenseSynchronizer] ") for line in lines)
-    assert "comparing 300 with 100 performances: 100 %" in lines[-2]
+    assert "comparing 300 with 100 trials: 100 %" in lines[-2]
     assert "warping: 100 %" in lines[-1]
 
 

@@ -26,8 +26,8 @@ def walks(n, seed):
     return [np.cumsum(random.standard_normal((length, 3)), axis=0) for length in lengths]
 
 
-def alike(performances, dtype):
-    return np.stack([x[:30] for x in performances]).astype(dtype)
+def alike(trials, dtype):
+    return np.stack([x[:30] for x in trials]).astype(dtype)
 
 
 PORTIONS = {
@@ -167,7 +167,7 @@ def test_refused_and_unreadable_portions_do_not_stop_others(files, capsys):
         (files[1] / name).write_bytes(content)
     assert stream_files.main([str(path) for path in files]) == 1
     printed = capsys.readouterr().out
-    assert re.search(r"^b\.npy: Performance 1.*infinity", printed, re.MULTILINE)
+    assert re.search(r"^b\.npy: Trial 1.*infinity", printed, re.MULTILINE)
     for name in broken:
         pattern = rf"^{re.escape(name)}: .*It cannot be read, is it whole\? "
         assert re.search(pattern, printed, re.MULTILINE)

@@ -86,9 +86,9 @@ def test_unknown_params_are_refused_after_a_union(union):
 @pytest.mark.parametrize("view", [POSITIONS, *UNIONS.values()])
 def test_synchronized_bodies_are_drawn_for_any_view(view):
     pipe = make_pipeline(view, LinearSynchronizer(20)).fit(BUNCH.data)
-    shown = SkeletonDisplay.from_estimator(pipe, BUNCH.data, performances=[1, 0])
+    shown = SkeletonDisplay.from_estimator(pipe, BUNCH.data, trials=[1, 0])
     plain = make_pipeline(COSINES, LinearSynchronizer(20)).fit(BUNCH.data)
-    expected = SkeletonDisplay.from_estimator(plain, BUNCH.data, performances=[1, 0])
+    expected = SkeletonDisplay.from_estimator(plain, BUNCH.data, trials=[1, 0])
     for bodies, right in zip(shown.scenes, expected.scenes, strict=True):
         for one, other in zip(bodies, right, strict=True):
             np.testing.assert_array_equal(one, other)
@@ -111,15 +111,15 @@ def test_departures_of_a_raised_arm_mark_its_limbs(reduced):
         ).fit(BUNCH.data)
         for view in (clone(BOTH), clone(COSINES))
     )
-    good, bad = (SkeletonDisplay.from_departures(pipe, X, performance=i) for i in (0, 1))
+    good, bad = (SkeletonDisplay.from_departures(pipe, X, trial=i) for i in (0, 1))
     assert "is accepted" in good.heading
     assert not any(good.marked)
     # An aSpace of bends hardly shows that an arm waves, but its residuals do.
     assert reduced or "not accepted" in bad.heading
     arms = {(shoulder, elbow), (elbow, wrist)}
     assert all(arms & set(bones) for bones in bad.marked)
-    expected = SkeletonDisplay.from_departures(plain, X, performance=1, frames=[3, 12])
-    shown = SkeletonDisplay.from_departures(pipe, X, performance=1, frames=[3, 12])
+    expected = SkeletonDisplay.from_departures(plain, X, trial=1, frames=[3, 12])
+    shown = SkeletonDisplay.from_departures(pipe, X, trial=1, frames=[3, 12])
     np.testing.assert_allclose(shown.scenes[1][0], expected.scenes[1][0], atol=1e-9)
 
 
