@@ -41,7 +41,8 @@ from harness import command_line, percent, print_head, print_row, run_tables
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import DenseSynchronizer, FrameWise, compare_groups
+from sklearn_motionsync import DenseSynchronizer, FrameWise
+from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.datasets import make_gait
 
 P, KNEE, LEVEL, PERMUTATIONS = 101, 1, 0.05, 999

@@ -29,8 +29,8 @@ import numpy as np
 from harness import command_line, print_head, print_row, run_tables
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
-from sklearn_motionsync import CycleSegmenter
 from sklearn_motionsync.datasets import load_trials
+from sklearn_motionsync.takes import CycleSegmenter
 
 CYCLIC = {"cmu07_walk": "walk", "hdm05": "jogLeftCircle4StepsRstart"}
 SINGLE = {

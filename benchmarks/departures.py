@@ -29,9 +29,9 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     Match,
     Skeleton,
-    find_departures,
 )
 from sklearn_motionsync.datasets import load_trials
+from sklearn_motionsync.model import find_departures
 
 P = 60
 BODY = Skeleton.paper()

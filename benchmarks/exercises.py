@@ -26,8 +26,8 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     Skeleton,
-    mirror,
 )
+from sklearn_motionsync.body import mirror
 from sklearn_motionsync.body.limbs import PARTS
 from sklearn_motionsync.body.mirror import exchange_of_sides
 from sklearn_motionsync.datasets import load_trials

@@ -21,8 +21,9 @@ from exercises import LANDMARKS
 from harness import command_line, print_head, print_row, run_tables
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
-from sklearn_motionsync import Skeleton, gait_events
+from sklearn_motionsync import Skeleton
 from sklearn_motionsync.datasets import load_trials
+from sklearn_motionsync.gait import gait_events
 from sklearn_motionsync.gait.recordings import joints_of_feet
 from sklearn_motionsync.io import read_motion
 

@@ -38,24 +38,21 @@ from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
     ASpace,
-    CycleSegmenter,
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    MotionTracker,
-    OnlineSynchronizer,
     PartSynchronizer,
-    blend_trials,
-    compare_groups,
-    compare_to_norm,
-    find_departures,
-    find_trials,
-    synchronization_distances,
-    write_report,
 )
+from sklearn_motionsync.comparison import compare_groups, compare_to_norm
 from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.display import SynchronizationDisplay
 from sklearn_motionsync.io import read_motion
+from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
+from sklearn_motionsync.model import find_departures
+from sklearn_motionsync.recognition import synchronization_distances
+from sklearn_motionsync.report import write_report
+from sklearn_motionsync.synchronizers import blend_trials
+from sklearn_motionsync.takes import CycleSegmenter, find_trials
 
 ROOT = Path(__file__).resolve().parents[1]
 

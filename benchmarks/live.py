@@ -34,7 +34,8 @@ from harness import (
 from scipy.signal import lfilter
 from scipy.spatial.distance import cdist
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, OnlineSynchronizer
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync.live import OnlineSynchronizer
 
 ARCHIVES = {"hdm05": "HDM05", "utkinect": "UTKinect"}
 OURS = "OnlineSynchronizer"

@@ -22,14 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from cycles import foot_strikes, read
 from harness import P, command_line, print_head, print_row, run_tables
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Skeleton
+from sklearn_motionsync.live import OnlineSynchronizer
+from sklearn_motionsync.takes import CycleSegmenter
+
 from live import phase_of
-from sklearn_motionsync import (
-    CycleSegmenter,
-    DenseSynchronizer,
-    DirectionCosines,
-    OnlineSynchronizer,
-    Skeleton,
-)
 
 SECONDS = 60
 # Amplitude and seconds of the changes of pace; seconds at which turns begin, and of one turn.

@@ -22,12 +22,8 @@ from harness import command_line, print_head, print_row, run_tables
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import (
-    ASpace,
-    DenseSynchronizer,
-    FrameWise,
-    compare_to_norm,
-)
+from sklearn_motionsync import ASpace, DenseSynchronizer, FrameWise
+from sklearn_motionsync.comparison import compare_to_norm
 from sklearn_motionsync.datasets import make_gait
 
 P, NEW, NORMS = 101, 12, 24

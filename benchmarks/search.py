@@ -16,14 +16,9 @@ import numpy as np
 from harness import command_line, print_head, print_row, run_tables
 from scipy.spatial.distance import cdist
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    find_trials,
-)
+from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import load_trials
+from sklearn_motionsync.takes import find_trials
 
 P = 50
 FOLDS = [(f"s{i:02d}", f"s{i + 1:02d}") for i in range(1, 11, 2)]

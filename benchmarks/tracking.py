@@ -22,7 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from harness import P, command_line, percent, print_head, print_row, read_archive, run_tables
 from scipy.linalg import cho_factor, cho_solve
-from sklearn_motionsync import DenseSynchronizer, DirectionCosines, JointNoise, MotionTracker
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines
+from sklearn_motionsync.body import JointNoise
+from sklearn_motionsync.live import MotionTracker
 
 KINDS = ("arm", "legs", "gap", "moved")
 SMALL, LARGE, GAP, TAKES = 0.01, 0.05, 20, 2

@@ -9,15 +9,10 @@ fast, and each in an individual way. The blend has the mean of their timing and 
 import matplotlib.pyplot as plt
 import numpy as np
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    Match,
-    blend_trials,
-)
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, Match
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay
+from sklearn_motionsync.synchronizers import blend_trials
 
 bunch = make_bending(8, style=2, random_state=11)
 pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer())

@@ -11,9 +11,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import ActionModel, CycleSegmenter, DenseSynchronizer, FrameWise
+from sklearn_motionsync import ActionModel, DenseSynchronizer, FrameWise
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import ActionModelDisplay, CycleDisplay
+from sklearn_motionsync.takes import CycleSegmenter
 
 gait = make_gait(6, n_cycles=4, takes=True, warp=2, random_state=0)
 takes = FrameWise(StandardScaler()).fit_transform(gait.data)  # degrees and body weights

@@ -9,15 +9,10 @@ action from trials that were cut out by hand. It then finds the action in takes 
 import matplotlib.pyplot as plt
 import numpy as np
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    find_trials,
-)
+from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SearchDisplay
+from sklearn_motionsync.takes import find_trials
 
 # %%
 # What to look for

@@ -8,9 +8,9 @@ force plates. The walks are made up, so the true events are known. Half of the p
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sklearn_motionsync import gait_events, gait_parameters
 from sklearn_motionsync.datasets import make_walk
 from sklearn_motionsync.display import GaitDisplay
+from sklearn_motionsync.gait import gait_events, gait_parameters
 
 even = make_walk(5, random_state=0)
 limping = make_walk(5, asymmetry=6, random_state=1)  # the left foot strikes late

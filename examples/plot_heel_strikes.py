@@ -11,16 +11,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import (
-    ActionModel,
-    DenseSynchronizer,
-    FrameWise,
-    LinearSynchronizer,
-    find_departures,
-)
+from sklearn_motionsync import ActionModel, DenseSynchronizer, FrameWise, LinearSynchronizer
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import ActionModelDisplay
 from sklearn_motionsync.io import cut_at_events, keyframes_from_events
+from sklearn_motionsync.model import find_departures
 
 gait = make_gait(12, n_cycles=4, takes=True, random_state=0)
 

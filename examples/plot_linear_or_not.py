@@ -11,7 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import spm1d
-from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer, compare_groups
+from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
+from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.datasets import make_gait
 
 # %%

@@ -9,9 +9,10 @@ moments are known here, so the answers can be judged.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sklearn_motionsync import DirectionCosines, OnlineSynchronizer
+from sklearn_motionsync import DirectionCosines
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import PhaseDisplay
+from sklearn_motionsync.live import OnlineSynchronizer
 
 known = make_bending(24, n_actors=6, style=2, random_state=0)
 new = make_bending(6, n_actors=6, style=2, random_state=7)  # six others

@@ -17,10 +17,10 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    find_departures,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import ActionModelDisplay, SkeletonDisplay
+from sklearn_motionsync.model import find_departures
 
 bunch = make_bending(24, random_state=0)
 steps = DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(100), ActionModel()

@@ -13,9 +13,10 @@ import pandas as pd
 from sklearn.metrics import ConfusionMatrixDisplay, roc_auc_score
 from sklearn.model_selection import GroupKFold, cross_val_predict
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionClassifier, DirectionCosines, find_departures
+from sklearn_motionsync import ActionClassifier, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay
+from sklearn_motionsync.model import find_departures
 
 # %%
 # Five actions

@@ -10,7 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import DenseSynchronizer, FrameWise, Match, compare_groups
+from sklearn_motionsync import DenseSynchronizer, FrameWise, Match
+from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.datasets import make_gait
 
 # %%

@@ -9,9 +9,10 @@ visible ones, and from how people do this action. The truth is known here.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sklearn_motionsync import DirectionCosines, MotionTracker
+from sklearn_motionsync import DirectionCosines
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay, TrackingDisplay
+from sklearn_motionsync.live import MotionTracker
 
 RATE, NOISE = 30, 0.05
 known = make_bending(16, n_frames=80, n_actors=8, style=2, frame_rate=RATE, random_state=0)

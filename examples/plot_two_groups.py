@@ -12,7 +12,8 @@ import matplotlib.pyplot as plt
 import pandas as pd
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import DenseSynchronizer, FrameWise, compare_groups
+from sklearn_motionsync import DenseSynchronizer, FrameWise
+from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import GroupDisplay
 

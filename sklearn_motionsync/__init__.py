@@ -12,38 +12,20 @@
 [1, 1, -1]
 """
 
-from . import datasets, display, io, metrics
+from importlib import import_module
+
 from .body.direction_cosines import DirectionCosines
-from .body.joint_noise import JointNoise
 from .body.joint_positions import JointPositions
-from .body.mirror import mirror
 from .body.skeleton import Skeleton
-from .comparison.events import compare_events
-from .comparison.groups import GroupComparison, compare_groups
-from .comparison.norm import NormComparison, compare_to_norm
-from .gait.events import gait_events
-from .gait.parameters import gait_parameters
 from .inputs.long_tables import to_frame, to_trials
 from .model.action_model import ActionModel
-from .model.departures import find_departures
 from .model.detector import ActionDetector
-from .online.members import Track
-from .online.stream import LivePhase
-from .online.synchronizer import OnlineSynchronizer
-from .online.tracker import MotionTracker
-from .recognition import ActionClassifier, synchronization_distances
-from .report.player import write_player
-from .report.report import write_report
-from .segmentation.cycles import CycleSegmenter
-from .segmentation.search import find_trials
-from .segmentation.self_correlation import self_correlation
-from .synchronizers.base import Synchronizer
-from .synchronizers.blending import blend_trials
+from .recognition.classifier import ActionClassifier
 from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.learning import SynchronizationWarning
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
-from .synchronizers.parts import Lags, PartSynchronizer
+from .synchronizers.parts import PartSynchronizer
 from .synchronizers.timing import TimingChannel
 from .transformers.aspace import ASpace
 from .transformers.framewise import FrameWise
@@ -53,60 +35,89 @@ __all__ = [
     "ActionClassifier",
     "ActionDetector",
     "ActionModel",
-    "CycleSegmenter",
     "DenseSynchronizer",
     "DirectionCosines",
     "FrameWise",
-    "GroupComparison",
-    "JointNoise",
     "JointPositions",
-    "Lags",
     "LinearSynchronizer",
-    "LivePhase",
     "Match",
-    "MotionTracker",
-    "NormComparison",
-    "OnlineSynchronizer",
     "PartSynchronizer",
     "Skeleton",
     "SynchronizationWarning",
-    "Synchronizer",
     "TimingChannel",
-    "Track",
-    "blend_trials",
-    "compare_events",
-    "compare_groups",
-    "compare_to_norm",
-    "datasets",
-    "display",
-    "find_departures",
-    "find_trials",
-    "gait_events",
-    "gait_parameters",
-    "io",
-    "metrics",
-    "mirror",
-    "self_correlation",
-    "synchronization_distances",
     "to_frame",
     "to_trials",
-    "write_player",
-    "write_report",
 ]
 
-# The displays are named in ``display``; they can be imported from here, too.
-from .display import ActionModelDisplay as ActionModelDisplay
-from .display import CycleDisplay as CycleDisplay
-from .display import GaitDisplay as GaitDisplay
-from .display import GroupDisplay as GroupDisplay
-from .display import LagDisplay as LagDisplay
-from .display import MetricDisplay as MetricDisplay
-from .display import NormDisplay as NormDisplay
-from .display import PhaseDisplay as PhaseDisplay
-from .display import SearchDisplay as SearchDisplay
-from .display import SkeletonDisplay as SkeletonDisplay
-from .display import SynchronizationDisplay as SynchronizationDisplay
-from .display import TrackingDisplay as TrackingDisplay
-from .display import TrellisDisplay as TrellisDisplay
-
 __version__ = "0.1.0"
+
+_ROOMS = {
+    "body",
+    "comparison",
+    "datasets",
+    "display",
+    "gait",
+    "io",
+    "live",
+    "metrics",
+    "model",
+    "recognition",
+    "report",
+    "synchronizers",
+    "takes",
+    "transformers",
+}
+
+# Where names are that were here before the first release. These lines go when it is out.
+_NOW = {
+    "ActionModelDisplay": "display.ActionModelDisplay",
+    "CycleDisplay": "display.CycleDisplay",
+    "CycleSegmenter": "takes.CycleSegmenter",
+    "GaitDisplay": "display.GaitDisplay",
+    "GroupComparison": "comparison.GroupComparison",
+    "GroupDisplay": "display.GroupDisplay",
+    "JointNoise": "body.JointNoise",
+    "LagDisplay": "display.LagDisplay",
+    "Lags": "synchronizers.Lags",
+    "LivePhase": "live.LivePhase",
+    "MetricDisplay": "display.MetricDisplay",
+    "MotionTracker": "live.MotionTracker",
+    "NormComparison": "comparison.NormComparison",
+    "NormDisplay": "display.NormDisplay",
+    "OnlineSynchronizer": "live.OnlineSynchronizer",
+    "PhaseDisplay": "display.PhaseDisplay",
+    "SearchDisplay": "display.SearchDisplay",
+    "SkeletonDisplay": "display.SkeletonDisplay",
+    "SynchronizationDisplay": "display.SynchronizationDisplay",
+    "Synchronizer": "synchronizers.Synchronizer",
+    "Track": "live.Track",
+    "TrackingDisplay": "display.TrackingDisplay",
+    "TrellisDisplay": "display.TrellisDisplay",
+    "blend_performances": "synchronizers.blend_trials",
+    "blend_trials": "synchronizers.blend_trials",
+    "compare_events": "comparison.compare_events",
+    "compare_groups": "comparison.compare_groups",
+    "compare_to_norm": "comparison.compare_to_norm",
+    "find_departures": "model.find_departures",
+    "find_performances": "takes.find_trials",
+    "find_trials": "takes.find_trials",
+    "gait_events": "gait.gait_events",
+    "gait_parameters": "gait.gait_parameters",
+    "mirror": "body.mirror",
+    "online": "live",
+    "segmentation": "takes",
+    "self_correlation": "takes.self_correlation",
+    "synchronization_distances": "recognition.synchronization_distances",
+    "to_sequences": "to_trials",
+    "write_player": "report.write_player",
+    "write_report": "report.write_report",
+}
+
+
+def __getattr__(name):
+    """Import a room when it is first asked for, and name the new place of a name from before."""
+    if name in _ROOMS:
+        return import_module(f".{name}", __name__)
+    if name in _NOW:
+        raise ImportError(f"sklearn_motionsync.{name} is sklearn_motionsync.{_NOW[name]} now.")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -16,19 +16,18 @@ from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
     ASpace,
-    CycleSegmenter,
     DenseSynchronizer,
     DirectionCosines,
     FrameWise,
     JointPositions,
     LinearSynchronizer,
-    MotionTracker,
-    OnlineSynchronizer,
     PartSynchronizer,
     Skeleton,
     TimingChannel,
 )
 from sklearn_motionsync.datasets import make_gait
+from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
+from sklearn_motionsync.takes import CycleSegmenter
 
 from shift_synchronizer import ShiftSynchronizer
 

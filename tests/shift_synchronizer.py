@@ -1,7 +1,8 @@
 """A synchronizer as a user would write one: all there is to it is how it matches."""
 
 import numpy as np
-from sklearn_motionsync import Match, Synchronizer
+from sklearn_motionsync import Match
+from sklearn_motionsync.synchronizers import Synchronizer
 
 
 class ShiftSynchronizer(Synchronizer):

@@ -13,16 +13,16 @@ from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
     ASpace,
-    CycleSegmenter,
     DirectionCosines,
     FrameWise,
     LinearSynchronizer,
     Match,
-    blend_trials,
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.io import fill_gaps
 from sklearn_motionsync.model.similarity import movement_energies
+from sklearn_motionsync.synchronizers import blend_trials
+from sklearn_motionsync.takes import CycleSegmenter
 
 
 @pytest.fixture(scope="module")

@@ -6,16 +6,11 @@ Sums of products differ in these bits from processor to processor.
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import (
-    ASpace,
-    CycleSegmenter,
-    Match,
-    blend_trials,
-    find_trials,
-    to_trials,
-)
+from sklearn_motionsync import ASpace, Match, to_trials
 from sklearn_motionsync.io import cut_at_events
-from sklearn_motionsync.online.members import weighted_median
+from sklearn_motionsync.live.members import weighted_median
+from sklearn_motionsync.synchronizers import blend_trials
+from sklearn_motionsync.takes import CycleSegmenter, find_trials
 
 SEEDS = range(2)
 

@@ -9,17 +9,10 @@ import pandas as pd
 import pytest
 import sklearn_motionsync
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ActionModel,
-    DenseSynchronizer,
-    PartSynchronizer,
-    compare_events,
-    compare_groups,
-    compare_to_norm,
-    display,
-    write_report,
-)
+from sklearn_motionsync import ActionModel, DenseSynchronizer, PartSynchronizer, display
+from sklearn_motionsync.comparison import compare_events, compare_groups, compare_to_norm
 from sklearn_motionsync.datasets import make_gait
+from sklearn_motionsync.report import write_report
 
 GAIT = make_gait(8, timing=5, n_frames=60, random_state=0)
 X, GROUP, PERSON = GAIT.data, GAIT.group, GAIT.person

@@ -55,7 +55,8 @@ class JointNoise:
 
     Examples
     --------
-    >>> from sklearn_motionsync import DirectionCosines, JointNoise
+    >>> from sklearn_motionsync import DirectionCosines
+    >>> from sklearn_motionsync.body import JointNoise
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bending = make_bending(4, random_state=0)
     >>> cosines = DirectionCosines(bending.skeleton).fit(bending.data)

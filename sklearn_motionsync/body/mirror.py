@@ -60,7 +60,7 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
 
     Examples
     --------
-    >>> from sklearn_motionsync import mirror
+    >>> from sklearn_motionsync.body import mirror
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(3, random_state=0)
     >>> mirrored = mirror(bunch.data, bunch.skeleton)

@@ -102,7 +102,7 @@ def compare_events(
     --------
     Toe-off is 5 % of the cycle later in group B.
 
-    >>> from sklearn_motionsync import compare_events
+    >>> from sklearn_motionsync.comparison import compare_events
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(16, timing=5, random_state=0)
     >>> table = compare_events(gait.data, gait.keyframes, gait.group, people=gait.person)

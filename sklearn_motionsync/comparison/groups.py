@@ -59,7 +59,8 @@ class GroupComparison:
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import LinearSynchronizer, compare_groups
+    >>> from sklearn_motionsync import LinearSynchronizer
+    >>> from sklearn_motionsync.comparison import compare_groups
     >>> rng, t = np.random.default_rng(0), np.linspace(0, 1, 50)
     >>> low = [np.sin(3 * t) + rng.normal(0, 0.1) for _ in range(8)]
     >>> high = [x + 0.3 * t for x in low]
@@ -220,7 +221,8 @@ def compare_groups(
     --------
     Group B pushes off later, by 5 % of the gait cycle.
 
-    >>> from sklearn_motionsync import DenseSynchronizer, compare_groups
+    >>> from sklearn_motionsync import DenseSynchronizer
+    >>> from sklearn_motionsync.comparison import compare_groups
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(16, timing=5, random_state=0)
     >>> sync = DenseSynchronizer(n_frames=101).fit(gait.data)

@@ -74,7 +74,8 @@ class NormComparison:
 
     Examples
     --------
-    >>> from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+    >>> from sklearn_motionsync import DenseSynchronizer
+    >>> from sklearn_motionsync.comparison import compare_to_norm
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(20, timing=6, random_state=0)
     >>> in_norm = gait.group == "A"
@@ -208,7 +209,8 @@ def compare_to_norm(
 
     Examples
     --------
-    >>> from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+    >>> from sklearn_motionsync import DenseSynchronizer
+    >>> from sklearn_motionsync.comparison import compare_to_norm
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(24, timing=7, random_state=0)
     >>> norm = [x for x, group in zip(gait.data, gait.group) if group == "A"]

@@ -14,7 +14,8 @@ from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features
 from ..inputs.types import TrialsLike, Unit
 from ..inputs.wording import counted
-from ..segmentation.cycles import (
+from ..synchronizers.match import UNITS, rates_of
+from ..takes.cycles import (
     CycleSegmenter,
     as_learnt,
     check_takes,
@@ -22,8 +23,7 @@ from ..segmentation.cycles import (
     correlate_takes,
     start_curves,
 )
-from ..segmentation.self_correlation import SelfCorrelation, required_strength
-from ..synchronizers.match import UNITS, rates_of
+from ..takes.self_correlation import SelfCorrelation, required_strength
 from .arguments import as_index, labels_of_signals
 from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, legend_above
 
@@ -71,7 +71,7 @@ class CycleDisplay(Display):
 
     Examples
     --------
-    >>> from sklearn_motionsync import CycleSegmenter
+    >>> from sklearn_motionsync.takes import CycleSegmenter
     >>> from sklearn_motionsync.display import CycleDisplay
     >>> from sklearn_motionsync.datasets import make_gait
     >>> bunch = make_gait(3, n_cycles=4, takes=True, random_state=0)

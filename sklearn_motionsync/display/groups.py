@@ -259,7 +259,7 @@ class GroupDisplay(Display):
 
         See Also
         --------
-        sklearn_motionsync.compare_groups : Tests what this figure shows.
+        sklearn_motionsync.comparison.compare_groups : Tests what this figure shows.
         """
         if statistic not in _STATISTICS:
             raise ValueError(f"statistic must be one of {list(_STATISTICS)}, got {statistic!r}.")
@@ -520,7 +520,8 @@ class NormDisplay(Display):
 
     Examples
     --------
-    >>> from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+    >>> from sklearn_motionsync import DenseSynchronizer
+    >>> from sklearn_motionsync.comparison import compare_to_norm
     >>> from sklearn_motionsync.display import NormDisplay
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(16, timing=6, random_state=0)
@@ -583,7 +584,7 @@ class NormDisplay(Display):
 
         See Also
         --------
-        sklearn_motionsync.compare_to_norm : Makes the comparison.
+        sklearn_motionsync.comparison.compare_to_norm : Makes the comparison.
         """
         if not isinstance(comparison, NormComparison):
             raise ValueError(f"Give what compare_to_norm returns, got {type(comparison).__name__}.")

@@ -17,9 +17,9 @@ from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.types import Features, Indexed, TrialsLike, ValuesLike
 from ..inputs.wording import counted
+from ..live.stream import Course, LivePhase, each_value
+from ..live.synchronizer import OnlineSynchronizer
 from ..matching.counting import first_largest
-from ..online.stream import Course, LivePhase, each_value
-from ..online.synchronizer import OnlineSynchronizer
 from ..utils.pipelines import find_step
 from .animation import MovingDisplay
 from .arguments import (
@@ -95,7 +95,8 @@ class PhaseDisplay(MovingDisplay):
 
     Examples
     --------
-    >>> from sklearn_motionsync import ASpace, DirectionCosines, OnlineSynchronizer
+    >>> from sklearn_motionsync import ASpace, DirectionCosines
+    >>> from sklearn_motionsync.live import OnlineSynchronizer
     >>> from sklearn_motionsync.display import PhaseDisplay
     >>> from sklearn_motionsync.datasets import make_bending
     >>> from sklearn.pipeline import make_pipeline

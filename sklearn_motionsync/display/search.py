@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator
 from ..inputs.tables import labels_of
 from ..inputs.types import TrialLike, TrialsLike
 from ..inputs.wording import counted
-from ..segmentation.search import find_trials
+from ..takes.search import find_trials
 from .arguments import as_trials
 from .base import COLORS, WIDTH, AxesLike, Display, legend_above
 

@@ -404,7 +404,7 @@ class SkeletonDisplay(MovingDisplay):
 
         See Also
         --------
-        sklearn_motionsync.find_departures : The departures as a table.
+        sklearn_motionsync.model.find_departures : The departures as a table.
         ActionModelDisplay : The curves of the trial, and the band that they leave.
         """
         scenes, skeleton, titles, marked, behind, heading = draw_departures(

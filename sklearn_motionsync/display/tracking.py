@@ -16,9 +16,9 @@ from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.types import Features, TrialLike, ValuesLike
 from ..inputs.wording import counted
+from ..live.members import Track
+from ..live.tracker import MotionTracker
 from ..matching.counting import runs_of
-from ..online.members import Track
-from ..online.tracker import MotionTracker
 from .arguments import (
     TIME_LABELS,
     as_frames,
@@ -90,7 +90,8 @@ class TrackingDisplay(Display):
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import LinearSynchronizer, MotionTracker
+    >>> from sklearn_motionsync import LinearSynchronizer
+    >>> from sklearn_motionsync.live import MotionTracker
     >>> from sklearn_motionsync.display import TrackingDisplay
     >>> t = np.linspace(0, 6, 60)
     >>> X = [np.column_stack([size * np.cos(t), size * np.sin(t)]) for size in (0.9, 1, 1.1, 1.2)]

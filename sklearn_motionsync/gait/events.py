@@ -127,7 +127,7 @@ def gait_events(
 
     Examples
     --------
-    >>> from sklearn_motionsync import gait_events
+    >>> from sklearn_motionsync.gait import gait_events
     >>> from sklearn_motionsync.datasets import make_walk
     >>> walk = make_walk(1, random_state=0)
     >>> events = gait_events(walk.data, walk.skeleton, frame_rate=walk.frame_rate)

@@ -94,7 +94,7 @@ def gait_parameters(
 
     Examples
     --------
-    >>> from sklearn_motionsync import gait_parameters
+    >>> from sklearn_motionsync.gait import gait_parameters
     >>> from sklearn_motionsync.datasets import make_walk
     >>> walk = make_walk(1, random_state=0)
     >>> table = gait_parameters(walk.data, walk.skeleton, frame_rate=walk.frame_rate)

@@ -125,7 +125,8 @@ def find_departures(
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import ActionModel, find_departures
+    >>> from sklearn_motionsync import ActionModel
+    >>> from sklearn_motionsync.model import find_departures
     >>> t = np.linspace(0, 1, 50)[:, np.newaxis]
     >>> model = ActionModel().fit([a * np.sin(3 * t) for a in (0.8, 0.9, 1.0, 1.1, 1.2)])
     >>> new = np.sin(3 * t)

@@ -134,7 +134,7 @@ def synchronization_distances(
     Two movements, each done in three ways, and the nearest other trial of each.
 
     >>> import numpy as np
-    >>> from sklearn_motionsync import synchronization_distances
+    >>> from sklearn_motionsync.recognition import synchronization_distances
     >>> t = np.linspace(0, 1, 60)
     >>> X = [np.column_stack([np.sin(5 * t**a), np.cos(b * t**a)])
     ...      for b in (5, 9) for a in (0.8, 1, 1.3)]

@@ -110,7 +110,7 @@ def write_player(
 
     Examples
     --------
-    >>> from sklearn_motionsync import write_player
+    >>> from sklearn_motionsync.report import write_player
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bends = make_bending(5, random_state=0)
     >>> path = write_player("bends.html", bends.data, bends.skeleton, frame_rate=50)

@@ -142,7 +142,8 @@ def write_report(
 
     Examples
     --------
-    >>> from sklearn_motionsync import DenseSynchronizer, write_report
+    >>> from sklearn_motionsync import DenseSynchronizer
+    >>> from sklearn_motionsync.report import write_report
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(6, n_cycles=2, random_state=0)
     >>> sync = DenseSynchronizer(n_frames=51).fit(gait.data)

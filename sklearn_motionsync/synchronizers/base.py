@@ -119,7 +119,8 @@ class Synchronizer(
     A synchronizer that lets the largest value of the first feature coincide.
 
     >>> import numpy as np
-    >>> from sklearn_motionsync import Match, Synchronizer
+    >>> from sklearn_motionsync import Match
+    >>> from sklearn_motionsync.synchronizers import Synchronizer
     >>> class PeakSynchronizer(Synchronizer):
     ...     def match(self, X):
     ...         peaks = self.normalize(X)[:, 1:-1, 0].argmax(axis=1) + 1

@@ -114,7 +114,7 @@ def blend_trials(
     --------
     >>> from sklearn.pipeline import make_pipeline
     >>> from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-    >>> from sklearn_motionsync import blend_trials
+    >>> from sklearn_motionsync.synchronizers import blend_trials
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, random_state=0)
     >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer())

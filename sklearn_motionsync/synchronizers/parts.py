@@ -482,7 +482,7 @@ class Lags(NamedTuple):
     Two subjects, two trials each. The arm of the second is always late by 4 frames.
 
     >>> import numpy as np
-    >>> from sklearn_motionsync import Lags
+    >>> from sklearn_motionsync.synchronizers import Lags
     >>> values = np.repeat([0.0, 0.2, 4.0, 4.4], 5).reshape(4, 1, 5)
     >>> groups = np.array([0, 0, 1, 1])
     >>> lags = Lags(values, ["arm"], "frames", groups, ["ann", "bob"])

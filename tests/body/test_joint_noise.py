@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 from sklearn import clone
 from sklearn.exceptions import NotFittedError
-from sklearn_motionsync import (
-    DirectionCosines,
-    JointNoise,
-    JointPositions,
-    LinearSynchronizer,
-    MotionTracker,
-    Skeleton,
-)
+from sklearn_motionsync import DirectionCosines, JointPositions, LinearSynchronizer, Skeleton
+from sklearn_motionsync.body import JointNoise
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.live import MotionTracker
 
 BENDING = make_bending(4, frame_rate=30, random_state=0)
 

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pytest
-from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, mirror, to_frame
+from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, to_frame
+from sklearn_motionsync.body import mirror
 from sklearn_motionsync.body.formats import FORMATS
 from sklearn_motionsync.body.mirror import exchange_of_sides
 from sklearn_motionsync.datasets import load_trials, make_bending

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-from sklearn_motionsync import compare_events, to_frame, to_trials
+from sklearn_motionsync import to_frame, to_trials
+from sklearn_motionsync.comparison import compare_events
 from sklearn_motionsync.datasets import make_gait
 
 GAIT = make_gait(16, 2, timing=3, random_state=0)

@@ -9,7 +9,8 @@ from scipy import stats
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer, compare_groups
+from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer
+from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.comparison.study import Design, Study, enhanced, families, scaled
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.utils.parallel import Progress

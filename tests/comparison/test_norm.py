@@ -6,13 +6,8 @@ import pytest
 from scipy import stats
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    FrameWise,
-    LinearSynchronizer,
-    Match,
-    compare_to_norm,
-)
+from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer, Match
+from sklearn_motionsync.comparison import compare_to_norm
 from sklearn_motionsync.datasets import make_gait
 
 P = 61

@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import CycleSegmenter, self_correlation
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import CycleDisplay
+from sklearn_motionsync.takes import CycleSegmenter, self_correlation
 
 GAIT = make_gait(2, 4, takes=True, random_state=0)
 HIP = 0

@@ -13,8 +13,6 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     Match,
-    MotionTracker,
-    OnlineSynchronizer,
     PartSynchronizer,
     Skeleton,
     display,
@@ -27,6 +25,7 @@ from sklearn_motionsync.display import (
     SynchronizationDisplay,
     TrellisDisplay,
 )
+from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
 
 PAPER = Skeleton.paper()
 NAMES = PAPER.column_names

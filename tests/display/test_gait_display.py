@@ -4,9 +4,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import gait_events
 from sklearn_motionsync.datasets import make_walk
 from sklearn_motionsync.display import GaitDisplay
+from sklearn_motionsync.gait import gait_events
 
 
 @pytest.fixture(scope="module")

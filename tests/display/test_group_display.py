@@ -8,7 +8,8 @@ from artists import segments, texts, ys
 from scipy import stats
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import ASpace, DenseSynchronizer, FrameWise, Match, compare_groups
+from sklearn_motionsync import ASpace, DenseSynchronizer, FrameWise, Match
+from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import GroupDisplay
 

@@ -5,9 +5,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Lags, PartSynchronizer
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, PartSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import LagDisplay
+from sklearn_motionsync.synchronizers import Lags
 
 N_FRAMES = 21
 

@@ -16,12 +16,12 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     Match,
     Skeleton,
-    find_departures,
 )
 from sklearn_motionsync.body.limbs import LIMBS, part_of_limb
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay
 from sklearn_motionsync.display.limb_departures import describe_departure, limb_departures
+from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.model.departures import Departure
 
 PAPER = Skeleton.paper()

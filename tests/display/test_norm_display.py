@@ -4,7 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from artists import segments, texts
-from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+from sklearn_motionsync import DenseSynchronizer
+from sklearn_motionsync.comparison import compare_to_norm
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import NormDisplay
 

@@ -5,15 +5,10 @@ import pandas as pd
 import pytest
 from artists import ends_of_bones
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ASpace,
-    DirectionCosines,
-    LinearSynchronizer,
-    LivePhase,
-    OnlineSynchronizer,
-)
+from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import PhaseDisplay
+from sklearn_motionsync.live import LivePhase, OnlineSynchronizer
 
 BUNCH = make_bending(8, n_frames=60, n_actors=2, random_state=0)
 COSINES = DirectionCosines(BUNCH.skeleton).fit(BUNCH.data[:6])

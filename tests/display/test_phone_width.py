@@ -8,16 +8,15 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
     ASpace,
-    CycleSegmenter,
     DenseSynchronizer,
     DirectionCosines,
-    MotionTracker,
-    OnlineSynchronizer,
     PartSynchronizer,
-    compare_to_norm,
     display,
 )
+from sklearn_motionsync.comparison import compare_to_norm
 from sklearn_motionsync.datasets import make_bending, make_gait, make_walk
+from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
+from sklearn_motionsync.takes import CycleSegmenter
 
 # At 388 pixels, the width of a page on a phone, letters of 10 points are still 8 pixels high.
 LARGEST_WIDTH = 6.5

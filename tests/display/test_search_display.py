@@ -4,8 +4,9 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import find_trials, to_trials
+from sklearn_motionsync import to_trials
 from sklearn_motionsync.display import SearchDisplay
+from sklearn_motionsync.takes import find_trials
 
 matplotlib.use("Agg")
 

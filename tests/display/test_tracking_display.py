@@ -5,9 +5,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
-from sklearn_motionsync import DirectionCosines, LinearSynchronizer, MotionTracker, Track
+from sklearn_motionsync import DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import TrackingDisplay
+from sklearn_motionsync.live import MotionTracker, Track
 
 BUNCH = make_bending(5, n_frames=24, random_state=0)
 COSINES = DirectionCosines(BUNCH.skeleton).fit(BUNCH.data)

@@ -3,8 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import DenseSynchronizer, Skeleton, gait_events
+from sklearn_motionsync import DenseSynchronizer, Skeleton
 from sklearn_motionsync.datasets import make_walk
+from sklearn_motionsync.gait import gait_events
 from sklearn_motionsync.gait.recordings import Walk, joints_of_feet
 from sklearn_motionsync.io import cut_at_events, keyframes_from_events
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import gait_events, gait_parameters
 from sklearn_motionsync.datasets import make_walk
+from sklearn_motionsync.gait import gait_events, gait_parameters
 
 
 @pytest.mark.parametrize("treadmill", [False, True])

@@ -13,14 +13,13 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    MotionTracker,
-    OnlineSynchronizer,
     Skeleton,
-    blend_trials,
     to_frame,
     to_trials,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
+from sklearn_motionsync.synchronizers import blend_trials
 
 from estimators import BODY, EVERY, NAMES, OF_TAKES, by_name, data_for, outputs
 

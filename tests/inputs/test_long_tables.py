@@ -15,14 +15,14 @@ from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
     ASpace,
-    CycleSegmenter,
     DenseSynchronizer,
     LinearSynchronizer,
-    find_departures,
     to_frame,
     to_trials,
 )
 from sklearn_motionsync.metrics import least_squares
+from sklearn_motionsync.model import find_departures
+from sklearn_motionsync.takes import CycleSegmenter
 
 KEYS = ["subject", "trial"]
 

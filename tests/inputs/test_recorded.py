@@ -10,15 +10,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.model_selection import KFold, cross_val_score
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ActionModel,
-    LinearSynchronizer,
-    MotionTracker,
-    OnlineSynchronizer,
-    find_trials,
-    to_frame,
-    to_trials,
-)
+from sklearn_motionsync import ActionModel, LinearSynchronizer, to_frame, to_trials
 from sklearn_motionsync.inputs.recorded import (
     Recorded,
     frame_rate_of_rows,
@@ -27,6 +19,8 @@ from sklearn_motionsync.inputs.recorded import (
     refuse_seconds,
     timeless,
 )
+from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
+from sklearn_motionsync.takes import find_trials
 
 from estimators import EVERY, by_name, data_for
 

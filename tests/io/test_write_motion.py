@@ -4,16 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    Skeleton,
-    blend_trials,
-)
+from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines, Skeleton
 from sklearn_motionsync.datasets import make_bending, make_walk
 from sklearn_motionsync.io import read_motion, write_motion
+from sklearn_motionsync.synchronizers import blend_trials
 
 from motion_files import body, put
 

@@ -5,14 +5,9 @@ import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
-from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    find_departures,
-)
+from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.model.variation import (
     mean_band,
     predictive_variance,

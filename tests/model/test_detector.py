@@ -15,12 +15,12 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     Match,
-    find_departures,
     to_frame,
 )
 from sklearn_motionsync.body.mirror import exchange_of_sides
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import SpreadScorer
+from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.model.acceptance import Contrast
 from sklearn_motionsync.model.similarity import movement_energies
 

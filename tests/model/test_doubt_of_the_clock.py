@@ -10,8 +10,8 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     Match,
-    find_departures,
 )
+from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.model.departures import Departure, explained_by_timing
 from sklearn_motionsync.synchronizers.intervals import Intervals, Measured
 

@@ -13,11 +13,10 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    find_departures,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.filters import smooth
-from sklearn_motionsync.model import similarity
+from sklearn_motionsync.model import find_departures, similarity
 from sklearn_motionsync.model.variation import mean_band, predictive_variance
 from test_similarity import slow_weights
 

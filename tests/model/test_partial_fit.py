@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
-from sklearn_motionsync import ActionModel, find_departures, to_frame
+from sklearn_motionsync import ActionModel, to_frame
+from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.model.similarity import TrialStream
 from test_similarity import (
     curves,

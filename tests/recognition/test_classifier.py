@@ -25,12 +25,12 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    find_departures,
-    synchronization_distances,
     to_frame,
 )
 from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.display import SkeletonDisplay
+from sklearn_motionsync.model import find_departures
+from sklearn_motionsync.recognition import synchronization_distances
 from sklearn_motionsync.recognition.classifier import choose_landmarks
 from sklearn_motionsync.recognition.distances import PairwiseDistance
 from sklearn_motionsync.recognition.kernel import (

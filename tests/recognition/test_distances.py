@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from joblib import parallel_config
 from sklearn.neighbors import KNeighborsClassifier
-from sklearn_motionsync import DirectionCosines, synchronization_distances, to_frame
+from sklearn_motionsync import DirectionCosines, to_frame
 from sklearn_motionsync.datasets import load_trials
-from sklearn_motionsync.recognition import distances
+from sklearn_motionsync.recognition import distances, synchronization_distances
 from sklearn_motionsync.recognition.distances import (
     BLOCK,
     PairwiseDistance,

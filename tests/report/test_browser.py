@@ -9,14 +9,9 @@ from urllib.parse import unquote
 import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    write_player,
-    write_report,
-)
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.report import write_player, write_report
 
 NAMES = "chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"
 BROWSER = next(filter(None, map(shutil.which, NAMES)), None)

@@ -10,16 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    DirectionCosines,
-    Match,
-    Skeleton,
-    write_player,
-    write_report,
-)
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Match, Skeleton
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.report import player
+from sklearn_motionsync.report import player, write_player, write_report
 
 BENDS = make_bending(5, n_frames=40, random_state=0)
 PIPE = make_pipeline(DirectionCosines(BENDS.skeleton), DenseSynchronizer(31)).fit(BENDS.data)

@@ -22,12 +22,10 @@ from sklearn_motionsync import (
     FrameWise,
     LinearSynchronizer,
     Match,
-    compare_groups,
-    write_player,
-    write_report,
 )
+from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.datasets import make_bending, make_gait
-from sklearn_motionsync.report import page, player, report
+from sklearn_motionsync.report import page, player, report, write_player, write_report
 
 GAIT = make_gait(8, 2, timing=8, random_state=0)
 TRIALS = [pd.DataFrame(x, columns=GAIT.feature_names) for x in GAIT.data]

@@ -9,10 +9,10 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    OnlineSynchronizer,
     PartSynchronizer,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.live import OnlineSynchronizer
 
 P = 60
 

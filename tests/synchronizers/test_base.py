@@ -16,10 +16,10 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     Match,
-    Synchronizer,
 )
 from sklearn_motionsync.display import SkeletonDisplay, SynchronizationDisplay, TrellisDisplay
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
+from sklearn_motionsync.synchronizers import Synchronizer
 
 from shift_synchronizer import ShiftSynchronizer
 

@@ -12,9 +12,9 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     Match,
     Skeleton,
-    blend_trials,
     to_trials,
 )
+from sklearn_motionsync.synchronizers import blend_trials
 
 import made_bodies
 from made_bodies import turned, with_still_root

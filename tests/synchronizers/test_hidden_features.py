@@ -9,13 +9,11 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     DenseSynchronizer,
     LinearSynchronizer,
-    MetricDisplay,
     PartSynchronizer,
-    SynchronizationDisplay,
     TimingChannel,
-    TrellisDisplay,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import MetricDisplay, SynchronizationDisplay, TrellisDisplay
 from sklearn_motionsync.metrics import SpreadScorer
 
 P = 40

@@ -17,13 +17,13 @@ from sklearn_motionsync import (
     Match,
     PartSynchronizer,
     TimingChannel,
-    blend_trials,
-    find_departures,
     to_frame,
 )
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay, TrellisDisplay
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
+from sklearn_motionsync.model import find_departures
+from sklearn_motionsync.synchronizers import blend_trials
 
 GAIT = make_gait(4, 3, random_state=0)
 N = len(GAIT.data)

@@ -8,12 +8,12 @@ from sklearn import clone
 from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
-    Lags,
     PartSynchronizer,
     Skeleton,
     SynchronizationWarning,
 )
 from sklearn_motionsync.datasets import load_trials, make_bending
+from sklearn_motionsync.synchronizers import Lags
 
 PARTS = ["left arm", "right arm", "left leg", "right leg", "trunk"]
 ARMS = {name: Skeleton.paper().parts()[name] for name in ("right arm", "left arm")}

@@ -5,15 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    Match,
-    Skeleton,
-    blend_trials,
-)
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, Match, Skeleton
 from sklearn_motionsync.datasets import load_trials, make_walk
+from sklearn_motionsync.synchronizers import blend_trials
 
 from made_bodies import standing
 

@@ -18,7 +18,6 @@ from sklearn_motionsync import (
     Match,
     PartSynchronizer,
     TimingChannel,
-    find_departures,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import (
@@ -28,6 +27,7 @@ from sklearn_motionsync.display import (
     TrellisDisplay,
 )
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
+from sklearn_motionsync.model import find_departures
 
 from shift_synchronizer import ShiftSynchronizer
 

@@ -20,15 +20,15 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from sklearn_motionsync import (
     ActionModel,
     ASpace,
-    CycleSegmenter,
     DenseSynchronizer,
     DirectionCosines,
     FrameWise,
-    find_departures,
     to_frame,
     to_trials,
 )
 from sklearn_motionsync.display import SkeletonDisplay
+from sklearn_motionsync.model import find_departures
+from sklearn_motionsync.takes import CycleSegmenter
 
 CHECKED = [FrameWise(make_pipeline(SimpleImputer(), StandardScaler()))]
 

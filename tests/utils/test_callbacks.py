@@ -13,13 +13,12 @@ from sklearn_motionsync import (
     DirectionCosines,
     FrameWise,
     LinearSynchronizer,
-    MotionTracker,
-    OnlineSynchronizer,
     PartSynchronizer,
     Skeleton,
     TimingChannel,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
 
 from estimators import EVERY, WHOLE, by_name, data_for, make_trials, outputs
 

@@ -14,23 +14,21 @@ from sklearn_motionsync import (
     ActionModel,
     DenseSynchronizer,
     LinearSynchronizer,
-    MotionTracker,
     PartSynchronizer,
-    compare_events,
-    compare_groups,
-    compare_to_norm,
     datasets,
     display,
-    find_trials,
     io,
     metrics,
-    write_report,
 )
+from sklearn_motionsync.comparison import compare_events, compare_groups, compare_to_norm
 from sklearn_motionsync.display import (
     GroupDisplay,
     LagDisplay,
     SynchronizationDisplay,
 )
+from sklearn_motionsync.live import MotionTracker
+from sklearn_motionsync.report import write_report
+from sklearn_motionsync.takes import find_trials
 from sklearn_motionsync.utils.groups import encode_classes, encode_groups, names_of_groups
 
 N, T = 6, np.linspace(0, 1, 20)

@@ -13,11 +13,11 @@ from sklearn_motionsync import (
     JointPositions,
     LinearSynchronizer,
     Match,
-    find_departures,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay, SynchronizationDisplay
 from sklearn_motionsync.metrics import SpreadScorer
+from sklearn_motionsync.model import find_departures
 
 BUNCH = make_bending(7, n_frames=40, random_state=2)
 K = list(BUNCH.keyframes)

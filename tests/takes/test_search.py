@@ -17,20 +17,20 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    find_trials,
 )
 from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.matching.warps import normalise
 from sklearn_motionsync.model.acceptance import log_moments
-from sklearn_motionsync.segmentation.search import (
+from sklearn_motionsync.takes import find_trials
+from sklearn_motionsync.takes.search import (
     Proposer,
     WindowSearch,
     best_hits,
     in_frames_given,
 )
-from sklearn_motionsync.segmentation.windows import (
+from sklearn_motionsync.takes.windows import (
     WindowDissimilarity,
     random_movements,
 )

@@ -6,16 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ASpace,
-    CycleSegmenter,
-    DenseSynchronizer,
-    DirectionCosines,
-    LinearSynchronizer,
-    OnlineSynchronizer,
-)
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_trials, make_gait
-from sklearn_motionsync.online.stream import Course, go_round
+from sklearn_motionsync.live import OnlineSynchronizer
+from sklearn_motionsync.live.stream import Course, go_round
+from sklearn_motionsync.takes import CycleSegmenter
 
 P, LENGTH = 50, 60
 NAMES = ("phase", "rate", "confidence", "lower", "upper", "cycle")

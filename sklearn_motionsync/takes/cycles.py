@@ -166,7 +166,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
 
     Examples
     --------
-    >>> from sklearn_motionsync import CycleSegmenter
+    >>> from sklearn_motionsync.takes import CycleSegmenter
     >>> from sklearn_motionsync.datasets import make_gait
     >>> bunch = make_gait(4, n_cycles=5, takes=True, random_state=0)
     >>> segmenter = CycleSegmenter(start=0).fit(bunch.data[:3])

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from sklearn_motionsync import CycleSegmenter
-from sklearn_motionsync.segmentation.stretches import (
+from sklearn_motionsync.takes import CycleSegmenter
+from sklearn_motionsync.takes.stretches import (
     PHASES,
     average_cycle,
     circular_peak,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sklearn_motionsync import CycleSegmenter
+from sklearn_motionsync.takes import CycleSegmenter
 
 
 @pytest.fixture(scope="module")

@@ -136,7 +136,8 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     A movement with one of two features hidden for a while.
 
     >>> import numpy as np
-    >>> from sklearn_motionsync import LinearSynchronizer, MotionTracker
+    >>> from sklearn_motionsync import LinearSynchronizer
+    >>> from sklearn_motionsync.live import MotionTracker
     >>> t = np.linspace(0, 1, 60)
     >>> def movement(size):
     ...     return np.column_stack([size * np.cos(6 * t), size * np.sin(6 * t)])

@@ -142,7 +142,7 @@ def self_correlation(take: TrialLike, skeleton: Skeleton | None = None) -> SelfC
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import self_correlation
+    >>> from sklearn_motionsync.takes import self_correlation
     >>> t = np.arange(200)
     >>> take = np.column_stack([np.sin(2 * np.pi * t / 63), np.cos(2 * np.pi * t / 63)])
     >>> result = self_correlation(take)

@@ -3,9 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import CycleSegmenter, gait_events
 from sklearn_motionsync.datasets import load_trials, make_walk
-from sklearn_motionsync.segmentation.stretches import move_to_events
+from sklearn_motionsync.gait import gait_events
+from sklearn_motionsync.takes import CycleSegmenter
+from sklearn_motionsync.takes.stretches import move_to_events
 
 WALK = make_walk(4, n_strides=6, random_state=0)
 

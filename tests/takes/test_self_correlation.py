@@ -4,9 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import Skeleton, self_correlation, to_frame
+from sklearn_motionsync import Skeleton, to_frame
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.segmentation.self_correlation import correlate, rejection_reason
+from sklearn_motionsync.takes import self_correlation
+from sklearn_motionsync.takes.self_correlation import correlate, rejection_reason
 
 import oracle
 

@@ -133,7 +133,8 @@ class OnlineSynchronizer(
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import ASpace, DirectionCosines, OnlineSynchronizer
+    >>> from sklearn_motionsync import ASpace, DirectionCosines
+    >>> from sklearn_motionsync.live import OnlineSynchronizer
     >>> from sklearn_motionsync.datasets import make_bending
     >>> from sklearn.pipeline import make_pipeline
     >>> bunch = make_bending(12, random_state=0)

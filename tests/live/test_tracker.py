@@ -7,15 +7,10 @@ import pandas as pd
 import pytest
 from sklearn import clone
 from sklearn.exceptions import NotFittedError
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    DirectionCosines,
-    JointNoise,
-    LinearSynchronizer,
-    MotionTracker,
-    Track,
-)
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, LinearSynchronizer
+from sklearn_motionsync.body import JointNoise
 from sklearn_motionsync.datasets import load_trials
+from sklearn_motionsync.live import MotionTracker, Track
 
 LIMBS = np.arange(1, 37).reshape(12, 3)
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.stats import multivariate_normal
-from sklearn_motionsync import LinearSynchronizer, MotionTracker
-from sklearn_motionsync.online import members
-from sklearn_motionsync.online.members import (
+from sklearn_motionsync import LinearSynchronizer
+from sklearn_motionsync.live import MotionTracker, members
+from sklearn_motionsync.live.members import (
     ParticleFilter,
     Particles,
     RunningTake,
@@ -17,14 +17,14 @@ from sklearn_motionsync.online.members import (
     systematic_resampling,
     weighted_median,
 )
-from sklearn_motionsync.online.state_space import (
+from sklearn_motionsync.live.state_space import (
     CausalSlopes,
     Clock,
     MaternProcess,
     RateProcess,
     TrackerModel,
 )
-from sklearn_motionsync.online.tracker import Observer
+from sklearn_motionsync.live.tracker import Observer
 
 
 def noise_of(deviation, n=3):

@@ -66,7 +66,8 @@ class Track(NamedTuple):
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import LinearSynchronizer, MotionTracker
+    >>> from sklearn_motionsync import LinearSynchronizer
+    >>> from sklearn_motionsync.live import MotionTracker
     >>> X = [size * np.sin(np.linspace(0, 3, 40))[:, np.newaxis] for size in (0.9, 1.0, 1.1)]
     >>> track = MotionTracker(LinearSynchronizer()).fit(X).track(X[0])
     >>> track

@@ -5,15 +5,11 @@ import copy
 import numpy as np
 import pytest
 from scipy.special import softmax
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    DirectionCosines,
-    LinearSynchronizer,
-    OnlineSynchronizer,
-)
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_trials, make_bending
-from sklearn_motionsync.online.stream import Streams, gains_of, phase_bounds
-from sklearn_motionsync.online.synchronizer import Reference, calibrate
+from sklearn_motionsync.live import OnlineSynchronizer
+from sklearn_motionsync.live.stream import Streams, gains_of, phase_bounds
+from sklearn_motionsync.live.synchronizer import Reference, calibrate
 from sklearn_motionsync.utils.parallel import Progress
 
 P = 100

@@ -4,13 +4,13 @@ import itertools
 
 import numpy as np
 import pytest
-from sklearn_motionsync.matching.costs import step_table
-from sklearn_motionsync.matching.trellis import Trellis
-from sklearn_motionsync.online.causal import (
+from sklearn_motionsync.live.causal import (
     CausalDerivative,
     CausalTrellis,
     causal_velocity,
 )
+from sklearn_motionsync.matching.costs import step_table
+from sklearn_motionsync.matching.trellis import Trellis
 
 from oracle import path_cost, step_costs
 
@@ -263,12 +263,12 @@ def test_long_streams_keep_their_costs_small_and_their_paths(kind, monkeypatch):
     base = np.tile(moving[:-1:2], (6, 1)) + 0.3 * rng.standard_normal((48, 3))
     trellis = Trellis(step_table("velocity", 2, 2), 0.5, 8, running=True)
     whole = CausalTrellis(trellis, moving, **kind)
-    monkeypatch.setattr("sklearn_motionsync.online.causal.REBASED", 5)
+    monkeypatch.setattr("sklearn_motionsync.live.causal.REBASED", 5)
     often = CausalTrellis(trellis, moving, **kind)
     for p, sample in enumerate(base):
-        monkeypatch.setattr("sklearn_motionsync.online.causal.REBASED", 4096)
+        monkeypatch.setattr("sklearn_motionsync.live.causal.REBASED", 4096)
         whole.advance(sample[np.newaxis])
-        monkeypatch.setattr("sklearn_motionsync.online.causal.REBASED", 5)
+        monkeypatch.setattr("sklearn_motionsync.live.causal.REBASED", 5)
         often.advance(sample[np.newaxis])
         (end, cost), (expected, total) = often.best(), whole.best()
         assert end == expected

@@ -11,7 +11,6 @@ from sklearn.utils import estimator_checks
 from sklearn_motionsync import (
     ActionModel,
     ASpace,
-    CycleSegmenter,
     DenseSynchronizer,
     FrameWise,
     Skeleton,
@@ -20,7 +19,8 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import CycleDisplay
-from sklearn_motionsync.segmentation.stretches import SampledStretch, locate_cycles
+from sklearn_motionsync.takes import CycleSegmenter
+from sklearn_motionsync.takes.stretches import SampledStretch, locate_cycles
 
 HIP = 0
 

@@ -64,7 +64,7 @@ class LivePhase(NamedTuple):
 
     Examples
     --------
-    >>> from sklearn_motionsync import LivePhase
+    >>> from sklearn_motionsync.live import LivePhase
     >>> now = LivePhase(phase=12.5, rate=1.0, confidence=0.9, lower=10.0, upper=16.0)
     >>> now.phase, now.upper - now.lower
     (12.5, 6.0)

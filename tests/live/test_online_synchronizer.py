@@ -10,19 +10,14 @@ from scipy.special import log_softmax
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    LinearSynchronizer,
-    OnlineSynchronizer,
-)
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_trials
+from sklearn_motionsync.live import OnlineSynchronizer
+from sklearn_motionsync.live.causal import CausalDerivative
+from sklearn_motionsync.live.stream import Resampler, Streams, check_times
+from sklearn_motionsync.live.synchronizer import Reference, calibrate
 from sklearn_motionsync.matching.matcher import Features
 from sklearn_motionsync.matching.units import Unit
-from sklearn_motionsync.online.causal import CausalDerivative
-from sklearn_motionsync.online.stream import Resampler, Streams, check_times
-from sklearn_motionsync.online.synchronizer import Reference, calibrate
 from sklearn_motionsync.utils.parallel import Progress
 
 P = 60

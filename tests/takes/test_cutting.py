@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import LinearSynchronizer, to_frame, to_trials
 from sklearn_motionsync.inputs.validation import check_trials
-from sklearn_motionsync.segmentation.cutting import cut_takes
+from sklearn_motionsync.takes.cutting import cut_takes
 
 ROWS = pd.DataFrame(
     {"take": [1, 0, 1], "start": [4, 0, 0], "stop": [9, 3, 4], "score": [0.3, 0.2, 0.1]}

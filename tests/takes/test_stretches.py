@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import CycleSegmenter
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import CycleDisplay
-from sklearn_motionsync.segmentation.stretches import find_repeats
+from sklearn_motionsync.takes import CycleSegmenter
+from sklearn_motionsync.takes.stretches import find_repeats
 
 
 def waves(n_frames, period, first=0):

@@ -166,7 +166,7 @@ def find_trials(
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import find_trials
+    >>> from sklearn_motionsync.takes import find_trials
     >>> t = np.linspace(0, 1, 40)
     >>> wave = np.column_stack([np.sin(6 * t), np.sin(9 * t)])
     >>> take = np.zeros((300, 2))

@@ -1,1 +1,0 @@
-"""Long recordings cut into trials: cycles, and where an action happens."""
