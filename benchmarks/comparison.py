@@ -191,7 +191,7 @@ def answer(joint, shape=None, timing=None):
 
 def ours(trials, groups, people):
     pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(trials)
-    found = compare_groups(pipe, trials, groups, people=people, n_permutations=PERMUTATIONS)
+    found = compare_groups(pipe, trials, groups, groups=people, n_permutations=PERMUTATIONS)
     masks = {what: np.zeros(P, dtype=bool) for what in ("shape", "timing")}
     if found.p_joint <= LEVEL:
         for row in found.clusters.itertuples():

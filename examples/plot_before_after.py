@@ -40,7 +40,7 @@ trials = [pd.DataFrame(x, columns=gait.feature_names) for x in strides]
 # ``paired=True`` compares each person's means before and after.
 
 pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(101)).fit(trials)
-found = compare_groups(pipe, trials, session, people=gait.person, paired=True)
+found = compare_groups(pipe, trials, session, groups=gait.person, paired=True)
 print(found.describe())
 found.clusters.round(2)
 
@@ -51,7 +51,7 @@ display = GroupDisplay.from_estimator(
     pipe,
     trials,
     session,
-    people=gait.person,
+    groups=gait.person,
     comparison=found,
     features=["knee_flexion", "vertical_force"],
     units=["degrees", "body weights"],
@@ -65,11 +65,11 @@ _ = display.figure_.suptitle("After the training, people push off later")
 # session, the pairs are lost. Then people differ more than the training changes them:
 
 try:
-    compare_groups(pipe, trials, session, people=gait.person)
+    compare_groups(pipe, trials, session, groups=gait.person)
 except ValueError as error:
     print(error)
 names = [f"{person} {when}" for person, when in zip(gait.person, session, strict=True)]
-lost = compare_groups(pipe, trials, session, people=names)
+lost = compare_groups(pipe, trials, session, groups=names)
 print(f"p of timing: {found.p_timing:.3f} in pairs, {lost.p_timing:.3f} without")
 
 plt.show()

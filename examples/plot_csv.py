@@ -55,7 +55,7 @@ display = SynchronizationDisplay.from_predictions(
     trials,
     match,
     features=["knee_flexion", "vertical_force"],
-    groups=gait.group,
+    y=gait.group,
     unit="percent",
     xlabel="% gait cycle",
 )

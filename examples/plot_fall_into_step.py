@@ -39,7 +39,7 @@ animation
 
 poses = make_pipeline(DirectionCosines(bunch.skeleton), DenseSynchronizer()).fit(bunch.data)
 display = SynchronizationDisplay.from_estimator(
-    poses, bunch.data, features=["pelvis_height", "torso_z"], groups=bunch.actor
+    poses, bunch.data, features=["pelvis_height", "torso_z"], y=bunch.actor
 )
 display.axes_[0].set_ylabel("pelvis height\n(1: upright)")
 display.axes_[2].set_ylabel("torso forward\n(cosine)")

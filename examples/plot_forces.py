@@ -62,7 +62,7 @@ table.round(2)
 # The lower panel shows the warps. Those of slow steps leave the diagonal about the valley, which
 # comes early in them. Those of fast steps leave it to the other side.
 
-display = SynchronizationDisplay.from_estimator(synchronizer, steps, groups=speeds, unit="percent")
+display = SynchronizationDisplay.from_estimator(synchronizer, steps, y=speeds, unit="percent")
 display.axes_[0].set_ylabel("vertical force\n(body weights)")
 valley = table.loc["valley"]
 _ = display.figure_.suptitle(

@@ -41,7 +41,7 @@ trials = [at_speed(*one) for one in zip(gait.data, speed, strict=True)]
 # The speed differs within people. So each person has a slope of her own, and slopes are tested.
 
 pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(101)).fit(trials)
-found = compare_groups(pipe, trials, covariate=speed, people=gait.person)
+found = compare_groups(pipe, trials, y=speed, covariate=True, groups=gait.person)
 print(found.describe())
 found.clusters.round(2)
 
@@ -67,8 +67,8 @@ _ = axis.set_title("The faster, the earlier", fontsize="medium")
 
 bent = [at_speed(x, 1.4 + (abs(v - 1.4) < 0.2)) for x, v in zip(gait.data, speed, strict=True)]
 pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(101)).fit(bent)
-print(compare_groups(pipe, bent, covariate=speed, people=gait.person).describe())
+print(compare_groups(pipe, bent, y=speed, covariate=True, groups=gait.person).describe())
 middle = ["middle" if abs(v - 1.4) < 0.2 else "other" for v in speed]
-print(compare_groups(pipe, bent, middle, people=gait.person, paired=True).describe())
+print(compare_groups(pipe, bent, middle, groups=gait.person, paired=True).describe())
 
 plt.show()

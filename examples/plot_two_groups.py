@@ -28,7 +28,7 @@ from sklearn_motionsync.display import GroupDisplay
 gait = make_gait(20, n_cycles=2, timing=3, random_state=1)
 trials = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
 pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(101)).fit(trials)
-found = compare_groups(pipe, trials, gait.group, people=gait.person)
+found = compare_groups(pipe, trials, gait.group, groups=gait.person)
 print(found.describe())
 found.clusters.round(2)
 
@@ -39,7 +39,7 @@ found.clusters.round(2)
 
 units = dict(zip(gait.feature_names, gait.units, strict=True))
 display = GroupDisplay.from_estimator(
-    pipe, trials, gait.group, people=gait.person, comparison=found, units=units
+    pipe, trials, gait.group, groups=gait.person, comparison=found, units=units
 )
 _ = display.figure_.suptitle("The groups differ in timing, not in their curves")
 
@@ -50,7 +50,7 @@ _ = display.figure_.suptitle("The groups differ in timing, not in their curves")
 
 other = make_gait(20, n_cycles=2, amplitude=15, random_state=1)
 pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(101)).fit(other.data)
-print(compare_groups(pipe, other.data, other.group, people=other.person).describe())
+print(compare_groups(pipe, other.data, other.group, groups=other.person).describe())
 
 # %%
 # Where it fails
@@ -62,7 +62,7 @@ for seed in range(10):
     same = make_gait(16, n_cycles=4, random_state=seed)
     sync = DenseSynchronizer(101).fit(same.data)
     for way, people in zip(called, (same.person, None), strict=True):
-        found = compare_groups(sync, same.data, same.group, people=people, n_permutations=199)
+        found = compare_groups(sync, same.data, same.group, groups=people, n_permutations=199)
         called[way] += found.p_joint <= 0.05
 print("called different:", called)
 

@@ -40,10 +40,10 @@ def report_of(estimator, trials, **params):
 # rate of its own.
 FUNCTIONS = {
     "compare_groups": lambda sync, _, path, **k: compare_groups(
-        sync, X, GROUP, people=PERSON, n_permutations=49, random_state=0, unit="frames", **k
+        sync, X, GROUP, groups=PERSON, n_permutations=49, random_state=0, unit="frames", **k
     ).to_frame(),
     "compare_to_norm": lambda sync, _, path, **k: (
-        compare_to_norm(sync, X, GROUP, norm="A", people=PERSON, **k).verdicts
+        compare_to_norm(sync, X, GROUP, norm="A", groups=PERSON, **k).verdicts
     ),
     "write_report": lambda sync, _, path, **k: report_of(sync, X, path=path, unit="frames", **k),
     "ActionModelDisplay.from_estimator": lambda _, model, path, **k: (

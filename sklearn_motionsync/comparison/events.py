@@ -105,7 +105,7 @@ def compare_events(
     >>> from sklearn_motionsync.comparison import compare_events
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(16, timing=5, random_state=0)
-    >>> table = compare_events(gait.data, gait.keyframes, gait.group, people=gait.person)
+    >>> table = compare_events(gait.data, gait.keyframes, gait.group, groups=gait.person)
     >>> table.loc[3, ["A mean", "B mean", "size", "direction"]].tolist()  # the fourth is toe-off
     [...'B later than A']
 

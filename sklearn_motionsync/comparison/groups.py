@@ -226,7 +226,7 @@ def compare_groups(
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(16, timing=5, random_state=0)
     >>> sync = DenseSynchronizer(n_frames=101).fit(gait.data)
-    >>> found = compare_groups(sync, gait.data, gait.group, people=gait.person, n_permutations=499)
+    >>> found = compare_groups(sync, gait.data, gait.group, groups=gait.person, n_permutations=499)
     >>> found.to_frame()["differs"].tolist()  # joint, shape, timing, linear
     [True, False, True, True]
     >>> found.clusters[["what", "direction"]].drop_duplicates().values.tolist()

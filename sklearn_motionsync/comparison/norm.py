@@ -81,7 +81,7 @@ class NormComparison:
     >>> in_norm = gait.group == "A"
     >>> norm = [x for x, one in zip(gait.data, in_norm) if one]
     >>> sync = DenseSynchronizer(n_frames=101).fit(norm)
-    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", people=gait.person)
+    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", groups=gait.person)
     >>> bool(found.verdicts["differs"].mean() > 0.8)
     True
     """
@@ -215,7 +215,7 @@ def compare_to_norm(
     >>> gait = make_gait(24, timing=7, random_state=0)
     >>> norm = [x for x, group in zip(gait.data, gait.group) if group == "A"]
     >>> sync = DenseSynchronizer(n_frames=101).fit(norm)
-    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", people=gait.person)
+    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", groups=gait.person)
     >>> bool(found.verdicts["differs"].mean() > 0.8)
     True
     >>> found.departures["direction"].unique().tolist()

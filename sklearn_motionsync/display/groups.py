@@ -154,7 +154,7 @@ class GroupDisplay(Display):
     >>> gait = make_gait(8, timing=5, random_state=0)
     >>> pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(101)).fit(gait.data)
     >>> display = GroupDisplay.from_estimator(
-    ...     pipe, gait.data, gait.group, people=gait.person, features=[0, 1], units="degrees"
+    ...     pipe, gait.data, gait.group, groups=gait.person, features=[0, 1], units="degrees"
     ... )
     >>> [group.label for group in display.groups]
     ['A: 12 trials of 4 people', 'B: 12 trials of 4 people']
@@ -526,7 +526,7 @@ class NormDisplay(Display):
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(16, timing=6, random_state=0)
     >>> sync = DenseSynchronizer(n_frames=101).fit(gait.data)
-    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", people=gait.person)
+    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", groups=gait.person)
     >>> display = NormDisplay.from_comparison(found, "person1", features=[0, 1], units="degrees")
     >>> len(display.axes_)
     3

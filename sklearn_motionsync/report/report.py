@@ -147,7 +147,7 @@ def write_report(
     >>> from sklearn_motionsync.datasets import make_gait
     >>> gait = make_gait(6, n_cycles=2, random_state=0)
     >>> sync = DenseSynchronizer(n_frames=51).fit(gait.data)
-    >>> path = write_report("gait.html", sync, gait.data, people=gait.person)
+    >>> path = write_report("gait.html", sync, gait.data, groups=gait.person)
     >>> path.read_text(encoding="utf-8")[:15]
     '<!DOCTYPE html>'
     """

@@ -63,7 +63,7 @@ def test_a_table_in_seconds_without_groups():
     names = pd.MultiIndex.from_arrays([GAIT.person, GAIT.cycle], names=["subject", "trial"])
     trials = to_trials(to_frame(GAIT.data, trials=names))
     rows = (K.set_axis(names) / 100).rename_axis(columns="event").stack().rename("seconds")
-    found = compare_events(trials, rows.reset_index(), people=GAIT.person, frame_rate=100)
+    found = compare_events(trials, rows.reset_index(), groups=GAIT.person, frame_rate=100)
     assert list(found) == ["mean", "sd", "n"]
     np.testing.assert_allclose(found["mean"].loc[list(K)], of_people().mean(axis=0))
     seconds = compare_events(trials, rows.reset_index(), unit="seconds", frame_rate=100)
@@ -83,14 +83,14 @@ def test_events_in_attrs():
 
 def test_pairs_and_a_covariate():
     second = np.tile([0, 1], 16)
-    paired = compare_events(GAIT.data, K, second, people=GAIT.person, paired=True)
+    paired = compare_events(GAIT.data, K, second, groups=GAIT.person, paired=True)
     differences = SHARES[1::2] - SHARES[::2]
     np.testing.assert_allclose(paired["size"], differences.mean(axis=0))
     half = stats.t.ppf(0.975, 15) * stats.sem(differences)
     np.testing.assert_allclose(paired["upper"], differences.mean(axis=0) + half)
     speed = dict(zip(dict.fromkeys(GAIT.person), np.linspace(1, 2, 16), strict=True))
     values = [speed[p] for p in GAIT.person]
-    found = compare_events(GAIT.data, K, covariate=values, people=GAIT.person)
+    found = compare_events(GAIT.data, K, y=values, covariate=True, groups=GAIT.person)
     slope = stats.linregress(np.linspace(1, 2, 16), of_people()[:, 3]).slope
     assert found.loc["toe-off", "size"] == pytest.approx(slope)
     assert "with the covariate" in found.loc["toe-off", "direction"]

@@ -113,7 +113,7 @@ def test_p_values_of_one_value_are_those_of_a_permutation_test():
 def test_a_difference_in_timing_is_called_timing(late):
     gait, pipe = late
     found = compare_groups(
-        pipe, gait.data, gait.group, people=gait.person, signals=gait.data, n_permutations=199
+        pipe, gait.data, gait.group, groups=gait.person, signals=gait.data, n_permutations=199
     )
     assert found.to_frame()["differs"].tolist() == [True, False, True, True]
     assert set(found.clusters["what"]) == {"timing"}
@@ -129,7 +129,7 @@ def test_a_difference_in_timing_is_called_timing(late):
 def test_a_difference_in_shape_is_called_shape_in_its_unit():
     gait, pipe = studied(24, amplitude=18)
     found = compare_groups(
-        pipe, gait.data, gait.group, people=gait.person, signals=gait.data, n_permutations=199
+        pipe, gait.data, gait.group, groups=gait.person, signals=gait.data, n_permutations=199
     )
     answers = found.to_frame()["differs"]
     assert answers[["joint", "shape"]].all()
@@ -168,13 +168,13 @@ def test_a_constant_signal_leaves_timing_what_it_is(late):
     gait, _ = late
     knee = [np.column_stack([x[:, 1], np.ones(len(x))]) for x in gait.data]
     sync = DenseSynchronizer(P).fit(knee)
-    found = compare_groups(sync, knee, gait.group, people=gait.person, n_permutations=199)
+    found = compare_groups(sync, knee, gait.group, groups=gait.person, n_permutations=199)
     assert set(found.clusters["what"]) == {"timing"}
 
 
 def test_nothing_is_found_where_nothing_differs():
     gait, pipe = studied(16)
-    found = compare_groups(pipe, gait.data, gait.group, people=gait.person, n_permutations=99)
+    found = compare_groups(pipe, gait.data, gait.group, groups=gait.person, n_permutations=99)
     assert found.p_joint > 0.05
     assert len(found.clusters) == 0
     assert "no difference is found" in repr(found)
@@ -258,7 +258,9 @@ def test_sizes_are_those_of_welch_and_of_a_slope(few):
     assert found.direction == "b above a"
     ages = np.linspace(20, 60, 16)
     tilted = [x + 0.02 * age for x, age in zip(few[0], ages, strict=True)]
-    found = compare_groups(sync, tilted, covariate=ages, n_permutations=199).clusters.iloc[0]
+    found = compare_groups(sync, tilted, y=ages, covariate=True, n_permutations=199).clusters.iloc[
+        0
+    ]
     first, end = round(found.start * 29 / 100), round(found.end * 29 / 100) + 1
     slope = stats.linregress(ages, [x[first:end].mean() for x in tilted])
     assert found["size"] == pytest.approx(slope.slope)
@@ -277,7 +279,7 @@ def test_order_units_and_copies_of_trials_change_nothing(few):
         sync,
         X + X[::-1],
         groups + groups[::-1],
-        people=[*range(16), *reversed(range(16))],
+        groups=[*range(16), *reversed(range(16))],
         n_permutations=199,
     )
     assert one.to_frame().equals(twice.to_frame())
@@ -341,12 +343,12 @@ def test_names_and_chosen_features_of_tables():
     tables = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
     sync = DenseSynchronizer(P).fit(tables)
     found = compare_groups(
-        sync, tables, gait.group, people=gait.person, features="knee_flexion", n_permutations=199
+        sync, tables, gait.group, groups=gait.person, features="knee_flexion", n_permutations=199
     )
     assert set(found.clusters["feature"]) <= {"knee_flexion", "offset"}
     forces = [x[["vertical_force"]].iloc[::2] for x in tables]
     other = compare_groups(
-        sync, tables, gait.group, people=gait.person, signals=forces, n_permutations=199
+        sync, tables, gait.group, groups=gait.person, signals=forces, n_permutations=199
     )
     assert set(other.clusters["feature"]) <= {"vertical_force", "offset"}
     assert other.p_timing == found.p_timing

@@ -26,7 +26,7 @@ def late():
 
 
 def compared(gait, pipe, **params):
-    return compare_to_norm(pipe, gait.data, gait.group, norm="A", people=gait.person, **params)
+    return compare_to_norm(pipe, gait.data, gait.group, norm="A", groups=gait.person, **params)
 
 
 def test_late_patients_are_late_and_keep_their_shape(late):
@@ -135,7 +135,7 @@ def test_fewer_trials_are_compared_with_as_many(late):
         [gait.data[k] for k in keep],
         gait.group[keep],
         norm="A",
-        people=gait.person[keep],
+        groups=gait.person[keep],
     )
     two = compared(gait, pipe)
     assert (one.limits[0] > two.limits[0]).all()

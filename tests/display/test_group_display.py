@@ -164,12 +164,12 @@ def test_trials_seconds_and_labels(pipe):
 
 def test_pairs_are_joined_and_one_group_needs_no_label(pipe):
     halves = [("left", "right")[k % 2] for k in range(len(TRIALS))]
-    display = GroupDisplay.from_estimator(pipe, TRIALS, halves, people=GAIT.person)
+    display = GroupDisplay.from_estimator(pipe, TRIALS, halves, groups=GAIT.person)
     pairs = [line for line in display.axes_[-1].get_lines() if len(line.get_xdata()) == 2]
     assert len(pairs) == 14 + 1  # and the line at 0
-    display = GroupDisplay.from_estimator(pipe, TRIALS, people=GAIT.person)
+    display = GroupDisplay.from_estimator(pipe, TRIALS, groups=GAIT.person)
     assert texts(display.axes_[0]) == ["28 trials of 14 people"]
-    alone = GroupDisplay.from_estimator(pipe, TRIALS[:2], people=GAIT.person[:2])
+    alone = GroupDisplay.from_estimator(pipe, TRIALS[:2], groups=GAIT.person[:2])
     assert alone.bands_[0][0].get_paths() == []
 
 

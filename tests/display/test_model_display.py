@@ -159,7 +159,7 @@ def test_action_model_display_refuses(bunch, pipe, arguments, error, message):
 
 def test_many_groups_differ_in_color_or_line_style(bunch, pipe):
     names = [f"_${i}" for i in range(9)]
-    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, y=names, features=[0])
     (means,) = display.group_means_
     assert len({(str(line.get_color()), line.get_linestyle()) for line in means}) == 9
     assert len({line.get_linestyle() for line in means}) == 4
@@ -210,7 +210,7 @@ def test_legends_are_above_the_panels(bunch, pipe, layout, size, kind):
     axes = None if size is None else plt.figure(figsize=size, layout=layout).add_subplot()
     if kind == "synchronization":
         display = SynchronizationDisplay.from_estimator(
-            pipe, bunch.data, groups=[f"group {g}" for g in range(9)], features=[0], ax=axes
+            pipe, bunch.data, y=[f"group {g}" for g in range(9)], features=[0], ax=axes
         )
     else:
         display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=[0], ax=axes)
@@ -232,7 +232,7 @@ def test_legend_of_many_groups_fits_on_small_axes(layout):
     X = np.sin(np.linspace(0, 3, 40)) + rng.normal(size=(16, 1))
     axes = plt.figure(figsize=(4, 3), layout=layout).add_subplot()
     sync, groups = LinearSynchronizer(20).fit(X), [f"group {i // 2}" for i in range(16)]
-    display = SynchronizationDisplay.from_estimator(sync, X, groups=groups, warps=False, ax=axes)
+    display = SynchronizationDisplay.from_estimator(sync, X, y=groups, warps=False, ax=axes)
     display.figure_.canvas.draw()
     legend = display.axes_[0].get_legend()
     assert sum(text.startswith("group") for text in texts(display.axes_[0])) == 8

@@ -16,7 +16,7 @@ GAIT = make_gait(24, 2, timing=7, amplitude=-25, random_state=1)
 def found():
     norm = [x for x, group in zip(GAIT.data, GAIT.group, strict=True) if group == "A"]
     sync = DenseSynchronizer(51).fit(norm)
-    return compare_to_norm(sync, GAIT.data, GAIT.group, norm="A", people=GAIT.person, level=0.2)
+    return compare_to_norm(sync, GAIT.data, GAIT.group, norm="A", groups=GAIT.person, level=0.2)
 
 
 @pytest.fixture(autouse=True)

@@ -78,7 +78,7 @@ def tracked_bodies(pipe, poses):
 
 DRAWN = {
     "synchronization": lambda pipe, poses: display.SynchronizationDisplay.from_estimator(
-        pipe, BUNCH.data, groups=BUNCH.actor
+        pipe, BUNCH.data, y=BUNCH.actor
     ),
     "synchronization in seconds": lambda pipe, poses: display.SynchronizationDisplay.from_estimator(
         pipe, BUNCH.data, features=[0], unit="seconds", frame_rate=50

@@ -60,7 +60,7 @@ def test_title_names_the_pattern(bunch, pipe):
 
 def test_the_mean_of_each_group_is_in_front(bunch, pipe):
     display = SynchronizationDisplay.from_estimator(
-        pipe, bunch.data, groups=np.array(GROUPS), features=[0, 2]
+        pipe, bunch.data, y=np.array(GROUPS), features=[0, 2]
     )
     warped = pipe[:3].transform(bunch.data)
     for row, feature in enumerate([0, 2]):
@@ -249,7 +249,7 @@ def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
     doubtful = Match.from_estimator(pipe, X).doubtful
     assert doubtful.tolist() == [i == 4 for i in range(9)]
     for groups in (None, GROUPS):
-        display = SynchronizationDisplay.from_estimator(pipe, X, features=[0, 1], groups=groups)
+        display = SynchronizationDisplay.from_estimator(pipe, X, features=[0, 1], y=groups)
         for lines in (*display.before_, *display.after_, display.offsets_):
             assert is_dotted(lines) == doubtful.tolist()
         assert display.axes_[-1].get_title().endswith("; dotted: 1 doubtful trial")

@@ -186,8 +186,8 @@ def gait(tmp_path_factory):
         folder / "report.html",
         DenseSynchronizer(51).fit(trials),
         trials,
-        groups=[f"{'averylongnameofagroup' * 3}{g}" for g in bunch.group],
-        people=bunch.person,
+        y=[f"{'averylongnameofagroup' * 3}{g}" for g in bunch.group],
+        groups=bunch.person,
     )
     return visit(path, folder)
 

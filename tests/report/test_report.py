@@ -157,7 +157,13 @@ def test_a_covariate_takes_the_place_of_groups(tmp_path):
     age = [int(p.removeprefix("person")) for p in GAIT.person]
     page = Text(
         write_report(
-            tmp_path / "a.html", LINEAR, TRIALS, covariate=age, people=GAIT.person, features=0
+            tmp_path / "a.html",
+            LINEAR,
+            TRIALS,
+            y=age,
+            covariate=True,
+            groups=GAIT.person,
+            features=0,
         )
     )
     assert "Covariate" in page.headings
@@ -274,8 +280,8 @@ def test_what_users_give_is_text_and_no_markup(tmp_path):
             tmp_path / "a.html",
             sync,
             tables,
-            groups=group,
-            people=people,
+            y=group,
+            groups=people,
             title=evil,
             left_out={evil: evil},
             features=evil,
@@ -369,7 +375,7 @@ def test_no_spreadsheet_runs_what_users_give(tmp_path):
     """Names that begin as a formula stand behind an apostrophe in the files of the report."""
     people = ['=HYPERLINK("http://x")', "+1", "@a", "-b"] * (len(TRIALS) // 4 + 1)
     path = write_report(
-        tmp_path / "a.html", LINEAR, TRIALS, people=people[: len(TRIALS)], features=0
+        tmp_path / "a.html", LINEAR, TRIALS, groups=people[: len(TRIALS)], features=0
     )
     table = pd.read_csv(io.StringIO(Text(path).data["files"]["trials.csv"]))
     assert table["person"].tolist()[:4] == ['\'=HYPERLINK("http://x")', "'+1", "'@a", "'-b"]

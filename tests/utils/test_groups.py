@@ -66,17 +66,17 @@ METHODS = {
         True,
     ),
     "compare_events(people)": (
-        lambda p: compare_events(X, EVENTS, [0, 0, 0, 1, 1, 1], people=p, n_permutations=19),
+        lambda p: compare_events(X, EVENTS, [0, 0, 0, 1, 1, 1], groups=p, n_permutations=19),
         True,
     ),
     "compare_groups(groups)": (lambda g: compare_groups(SYNC, X, g, n_permutations=19), True),
     "compare_groups(people)": (
-        lambda p: compare_groups(SYNC, X, [0, 0, 0, 1, 1, 1], people=p, n_permutations=19),
+        lambda p: compare_groups(SYNC, X, [0, 0, 0, 1, 1, 1], groups=p, n_permutations=19),
         True,
     ),
     "compare_to_norm(groups)": (lambda g: compare_to_norm(SYNC, X, g, norm=first_of(g)), True),
     "compare_to_norm(people)": (
-        lambda p: compare_to_norm(SYNC, X, [0, 0, 0, 1, 1, 1], norm=0, people=p),
+        lambda p: compare_to_norm(SYNC, X, [0, 0, 0, 1, 1, 1], norm=0, groups=p),
         True,
     ),
     "GroupDisplay.from_estimator(groups)": (
@@ -84,7 +84,7 @@ METHODS = {
         False,
     ),
     "GroupDisplay.from_estimator(people)": (
-        lambda p: GroupDisplay.from_estimator(SYNC, X, people=p),
+        lambda p: GroupDisplay.from_estimator(SYNC, X, groups=p),
         False,
     ),
     "write_report(groups)": (lambda g: report(groups=g), True),
@@ -95,11 +95,11 @@ METHODS = {
         False,
     ),
     "SynchronizationDisplay.from_estimator(groups)": (
-        lambda g: SynchronizationDisplay.from_estimator(SYNC, X, groups=g),
+        lambda g: SynchronizationDisplay.from_estimator(SYNC, X, y=g),
         False,
     ),
     "SynchronizationDisplay.from_predictions(groups)": (
-        lambda g: SynchronizationDisplay.from_predictions(X, SYNC.match(X).times, groups=g),
+        lambda g: SynchronizationDisplay.from_predictions(X, SYNC.match(X).times, y=g),
         False,
     ),
 }
