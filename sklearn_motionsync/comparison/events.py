@@ -30,10 +30,10 @@ __all__ = ["compare_events"]
 def compare_events(
     X: TrialsLike,
     events: Table | NumbersLike | None = None,
-    groups: Labels | None = None,
+    y: Labels | None = None,
     *,
-    covariate: ValuesLike | None = None,
-    people: Labels | None = None,
+    groups: Labels | None = None,
+    covariate: bool = False,
     paired: bool = False,
     unit: Unit = "percent",
     frame_rate: float | ValuesLike | None = None,
@@ -54,14 +54,15 @@ def compare_events(
         One row an event, with the trial, the event, and the time in seconds or frames, as in
         `io.keyframes_from_events`; or what that returns: frames, one row a trial and one column an
         event, NaN where one is not known. By default the events in ``attrs`` of the trials.
+    y : sequence of length n_sequences, default=None
+        What the trials are told apart by: the label of the group of each; or with ``covariate`` a
+        number for each, such as speed or age. Without it there is no test.
     groups : sequence of length n_sequences, default=None
-        The group of each trial. Without groups and covariate there is no test.
-    covariate : array-like of numbers, shape (n_sequences,), default=None
-        Such as speed or age, instead of groups: a regression.
-    people : sequence of length n_sequences, default=None
         The subject of each trial. By default every trial is of another person.
+    covariate : bool, default=False
+        Whether ``y`` are numbers: a regression.
     paired : bool, default=False
-        Whether every person has trials in both of two groups.
+        Whether every person has trials of both of two labels.
     unit : {"percent", "frames", "seconds"}, default="percent"
         Unit of the result: per cent of each trial, its frames, or seconds from its first frame.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
@@ -77,7 +78,7 @@ def compare_events(
     -------
     DataFrame
         One row an event. For each group ``mean``, ``sd`` and ``n`` of people, behind the name of
-        the group if there are several. With groups or a covariate also ``size``, the mean
+        the group if there are several. With ``y`` also ``size``, the mean
         difference, with the ``lower`` and ``upper`` end of its interval of 95 %; its ``direction``;
         ``p``, corrected for the number of events; and ``differs``.
 
@@ -124,9 +125,9 @@ def compare_events(
     check_test(level, n_permutations)
     values, names = _times_of_events(X, events, check_unit(unit), frame_rate)
     n = len(values)
-    is_tested = groups is not None or covariate is not None
-    study = Study.of(groups, covariate, people, paired, n) if is_tested else None
-    of_people = GroupsOfPeople.of(groups, people, n)
+    is_tested = y is not None or covariate or paired
+    study = Study.of(y, groups, covariate=covariate, paired=paired, n=n) if is_tested else None
+    of_people = GroupsOfPeople.of(None if covariate else y, groups, n)
     table = _table_of_groups(of_people, values, names)
     if study is None:
         return table

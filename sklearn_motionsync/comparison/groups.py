@@ -127,10 +127,10 @@ class GroupComparison:
 def compare_groups(
     estimator: BaseEstimator,
     X: TrialsLike,
-    groups: Labels | None = None,
+    y: Labels,
     *,
-    covariate: ValuesLike | None = None,
-    people: Labels | None = None,
+    groups: Labels | None = None,
+    covariate: bool = False,
     paired: bool = False,
     signals: TrialsLike | None = None,
     features: Features | None = None,
@@ -154,15 +154,16 @@ def compare_groups(
         Fitted on the trials of all groups together, so that no group has a pattern of its own.
     X : trials
         As the estimator takes them.
+    y : sequence of length n_sequences
+        What the trials are told apart by: the label of the group of each, such as a condition, of
+        two or more; or with ``covariate`` a number for each, such as speed or age.
     groups : sequence of length n_sequences, default=None
-        The group of each trial: two or more.
-    covariate : array-like of numbers, shape (n_sequences,), default=None
-        Such as speed or age, instead of groups: a regression.
-    people : sequence of length n_sequences, default=None
-        The subject of each trial. The mean of the trials of a person, in a group, is one
-        unit. By default every trial is of another person.
+        Whose the trials are: the subject of each. The mean of the trials of a person, with one
+        label, is one unit. By default every trial is of another person.
+    covariate : bool, default=False
+        Whether ``y`` are numbers: a regression.
     paired : bool, default=False
-        Whether every person has trials in both of two groups, such as before and after.
+        Whether every person has trials of both of two labels, such as before and after.
     signals : trials, default=None
         What is compared, such as joint angles in degrees: one sequence a trial, at any frame
         rate. By default X in its own units, if the same features reach the synchronizer, scaled or
@@ -196,8 +197,9 @@ def compare_groups(
     Raises
     ------
     ValueError
-        If there are neither groups nor a covariate, or both; too few people; people in several
-        groups without ``paired``, or with it in one only; gaps; no such unit or feature.
+        If ``y`` has one label only, or numbers without ``covariate``; ``groups`` tells the same
+        trials apart as ``y``; there are too few people; people have several labels without
+        ``paired``, or with it one only; there are gaps; there is no such unit or feature.
 
     See Also
     --------
@@ -243,7 +245,8 @@ def compare_groups(
         unit=unit,
         frame_rate=frame_rate,
     )
-    study = Study.of(groups, covariate, people, paired, len(aligned.curves))
+    n = len(aligned.curves)
+    study = Study.of(y, groups, covariate=covariate, paired=paired, n=n)
     return compare_aligned(aligned, study, level, n_permutations, random_state, n_jobs, verbose)
 
 

@@ -16,7 +16,7 @@ from ..matching.counting import first_largest, runs_of
 from ..model.acceptance import LogMoments
 from ..model.variation import predictive_variance
 from ..synchronizers.match import UNITS
-from ..utils.groups import encode_groups
+from ..utils.groups import encode_groups, refuse_classes_as_people
 from .curves import AlignedCurves
 from .study import check_level
 
@@ -136,10 +136,10 @@ class NormComparison:
 def compare_to_norm(
     estimator: BaseEstimator,
     X: TrialsLike,
-    groups: Labels,
+    y: Labels,
     *,
     norm: Hashable,
-    people: Labels | None = None,
+    groups: Labels | None = None,
     signals: TrialsLike | None = None,
     features: Features | None = None,
     level: float = 0.05,
@@ -158,11 +158,11 @@ def compare_to_norm(
         Fitted on the norm, or on all trials.
     X : trials
         Those of the norm and of the subjects, as the estimator takes them.
-    groups : sequence of length n_sequences
-        The group of each trial.
+    y : sequence of length n_sequences
+        What the trials are told apart by: a label for each, of which one is the norm.
     norm : label
-        The group that is the norm. The people of all others are compared with it.
-    people : sequence of length n_sequences, default=None
+        That of the norm. The people of all others are compared with it.
+    groups : sequence of length n_sequences, default=None
         The subject of each trial. By default every trial is of another person.
     signals : trials, default=None
         What is compared, as in `compare_groups`: by default X in its own units, or what reaches the
@@ -187,7 +187,7 @@ def compare_to_norm(
     Raises
     ------
     ValueError
-        If there is no such group, or nothing but the norm; a person is in several groups; the norm
+        If ``y`` has no such label, or no other one; a person has several labels; the norm
         has fewer than three people; and as from `compare_groups`.
 
     See Also
@@ -232,7 +232,7 @@ def compare_to_norm(
         unit=unit,
         frame_rate=frame_rate,
     )
-    study = _Subjects.of(groups, norm, people, len(aligned.curves))
+    study = _Subjects.of(y, norm, groups, len(aligned.curves))
     return _compare(aligned, study, float(level))
 
 
@@ -341,11 +341,13 @@ class _Subjects(NamedTuple):
     groups: list
 
     @classmethod
-    def of(cls, groups, norm, people, n):
-        codes, names = encode_groups(groups, n, at_least=2)
+    def of(cls, y, norm, groups, n):
+        codes, names = encode_groups(y, n, name="y", at_least=2)
         if norm not in names:
-            raise ValueError(f"norm={norm!r} is none of the groups {names[:6]}.")
-        persons, labels = encode_groups(people, n, name="people", at_least=2)
+            raise ValueError(f"norm={norm!r} is none of the labels {names[:6]} in y.")
+        persons, labels = encode_groups(groups, n, at_least=2)
+        if groups is not None:
+            refuse_classes_as_people(codes, persons)
         in_norm = codes == names.index(norm)
         of_norm, of_subjects, subjects, groups_of_subjects = [], [], [], []
         for person, label in enumerate(labels):
@@ -353,8 +355,8 @@ class _Subjects(NamedTuple):
             if len(set(codes[trials])) > 1:
                 several = [names[code] for code in sorted(set(codes[trials]))]
                 raise ValueError(
-                    f"people: {label!r} has trials in the groups {several}. Give people one name a "
-                    f"group, such as '{label} {several[0]}'."
+                    f"groups: {label!r} has trials of the labels {several} in y. Give people one "
+                    f"name a label, such as '{label} {several[0]}'."
                 )
             if in_norm[trials[0]]:
                 of_norm.append(trials)

@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from ..inputs.numbers import as_numbers
 from ..inputs.wording import counted
 from ..matching.counting import first_largest, first_smallest
-from ..utils.groups import encode_groups
+from ..utils.groups import encode_groups, refuse_classes_as_people
 from ..utils.parallel import run
 
 __all__ = [
@@ -83,25 +83,29 @@ class Study:
         return of_units
 
     @classmethod
-    def of(cls, groups, covariate, people, paired, n):
-        """The study of groups or of a covariate."""
-        if (groups is None) == (covariate is None):
-            raise ValueError("Give either groups or a covariate.")
-        persons, names = encode_groups(people, n, name="people", at_least=2)
-        if covariate is not None:
+    def of(cls, y, groups, *, covariate, paired, n):
+        """The study of groups of trials ``y`` or of a covariate ``y``, of the people ``groups``."""
+        if y is None:
+            raise ValueError(
+                "y is needed: the group of each trial, or a number for each with covariate=True."
+            )
+        persons, names = encode_groups(groups, n, at_least=2)
+        if covariate:
             if paired:
-                raise ValueError("paired=True needs two groups, not a covariate.")
-            return cls._of_covariate(_check_covariate(covariate, n), persons)
-        codes, labels = encode_groups(groups, n, at_least=2)
+                raise ValueError("paired=True needs two groups of trials, not a covariate.")
+            return cls._of_covariate(_check_covariate(y, n), persons, groups is not None)
+        _refuse_measures(y)
+        codes, labels = encode_groups(y, n, name="y", at_least=2)
+        if groups is not None:
+            refuse_classes_as_people(codes, persons)
         labels = [str(label) for label in labels]
         if paired:
-            return cls._of_pairs(codes, labels, persons, None if people is None else names)
+            return cls._of_pairs(codes, labels, persons, None if groups is None else names)
         for person in range(persons.max() + 1):
             if len(set(codes[persons == person])) > 1:
                 raise ValueError(
-                    f"people: {names[person]!r} has trials in several "
-                    "groups. Set paired=True for two groups with the same people; otherwise each "
-                    "person belongs to one group."
+                    f"groups: {names[person]!r} has trials of several labels in y. Set paired=True "
+                    "for two labels with the same people; otherwise each person has one label."
                 )
         maker = _means(persons)
         of_units = codes[_firsts(persons)]
@@ -111,7 +115,7 @@ class Study:
             raise ValueError(f"At least two people a group are needed, got {of}.")
         columns = (of_units[:, np.newaxis] == np.arange(1, len(labels))).astype(float)
         listed = f"{', '.join(labels[:-1])} and {labels[-1]}"
-        words = f"{listed}, {counted(len(of_units), 'unit')}"
+        words = f"{listed}, {_count_units(len(of_units), groups is not None)}"
         design = Design(columns - columns.mean(axis=0))
         return cls(design, maker, of_units, None, labels, words)
 
@@ -120,8 +124,8 @@ class Study:
         """Differences between the second and the first group, person by person."""
         if names is None or len(labels) != 2:
             raise ValueError(
-                f"paired=True needs people and two groups, got {counted(len(labels), 'group')}"
-                f"{'' if names is not None else ' and no people'}."
+                f"paired=True needs two labels in y, got {len(labels)}, and groups=, whose the "
+                f"trials are{'' if names is not None else ', which are missing'}."
             )
         makers = [_means(persons, codes == k) for k in (0, 1)]
         for maker, label in zip(makers, labels, strict=True):
@@ -129,7 +133,7 @@ class Study:
             if len(missing):
                 name = names[missing[0]]
                 raise ValueError(
-                    f"people: {name!r} has no trial in group {label!r}: leave them out."
+                    f"groups: {name!r} has no trial of {label!r} in y: leave them out."
                 )
         maker = makers[1] - makers[0]
         _check_units(len(maker))
@@ -137,7 +141,7 @@ class Study:
         return cls(Design(np.ones((len(maker), 1)), flips=True), maker, None, None, labels, words)
 
     @classmethod
-    def _of_covariate(cls, covariate, persons):
+    def _of_covariate(cls, covariate, persons, named):
         """A regression on what differs between people, or slopes of what differs within them."""
         maker = _means(persons)
         of_units = maker @ covariate
@@ -145,7 +149,7 @@ class Study:
         if np.abs(within).max() <= _ROUNDING * np.ptp(covariate):
             _check_units(len(maker))
             design = Design((of_units - of_units.mean())[:, np.newaxis])
-            words = f"Regression, {counted(len(maker), 'unit')}"
+            words = f"Regression, {_count_units(len(maker), named)}"
             return cls(design, maker, None, of_units, [], words)
         squares = np.bincount(persons, within**2)
         slopes = np.where(persons == np.arange(len(maker))[:, np.newaxis], within, 0)
@@ -233,12 +237,12 @@ class GroupsOfPeople:
     counts: list
 
     @classmethod
-    def of(cls, groups, people, n):
-        """Those of n trials; without people, every trial is of another person."""
-        codes, labels = encode_groups(groups, n)
-        if groups is None:
+    def of(cls, y, groups, n):
+        """Those of n trials; without groups, every trial is of another person."""
+        codes, labels = encode_groups(y, n, name="y")
+        if y is None:
             codes, labels = np.zeros(n, dtype=int), [""]
-        persons, _ = encode_groups(people, n, name="people")
+        persons, _ = encode_groups(groups, n)
         makers, members_of, counts = [], [], []
         for k in range(len(labels)):
             means = _means(persons, codes == k)
@@ -318,20 +322,34 @@ def _firsts(persons):
     return np.unique(persons, return_index=True)[1]
 
 
+def _count_units(n, named):
+    """What differs: people, or trials of which each counts as a person."""
+    return counted(n, "trial") if not named else "1 person" if n == 1 else f"{n} people"
+
+
+def _refuse_measures(y):
+    """Refuse numbers that are no labels."""
+    values = np.asarray(y)
+    if values.dtype.kind == "f" and np.any(values[np.isfinite(values)] % 1):
+        raise ValueError(
+            f"y has numbers such as {values[values % 1 != 0][0]:.6g}, which are no labels of "
+            "groups. Set covariate=True for a regression on them, or give labels."
+        )
+
+
 def _check_units(n):
     if n < _FEWEST:
         raise ValueError(f"At least {_FEWEST} people are needed, got {n}.")
 
 
 def _check_covariate(covariate, n):
-    values = as_numbers(covariate, "covariate", dtype=np.float64)
+    values = as_numbers(covariate, "y", dtype=np.float64)
     if values.shape != (n,):
         raise ValueError(
-            f"covariate must have one number for each of {counted(n, 'trial')}, got shape "
-            f"{values.shape}."
+            f"y must have one number for each of {counted(n, 'trial')}, got shape {values.shape}."
         )
     if not np.isfinite(values).all() or np.ptp(values) == 0:
-        raise ValueError("covariate must be finite, and must differ between trials.")
+        raise ValueError("y must be finite, and must differ between trials, if it is a covariate.")
     return values
 
 

@@ -178,9 +178,9 @@ class GroupDisplay(Display):
         cls,
         estimator: BaseEstimator,
         X: TrialsLike,
-        groups: Labels | None = None,
+        y: Labels | None = None,
         *,
-        people: Labels | None = None,
+        groups: Labels | None = None,
         signals: TrialsLike | None = None,
         features: Features | None = None,
         statistic: Literal["sd", "se", "interval"] = "sd",
@@ -204,9 +204,9 @@ class GroupDisplay(Display):
             Fitted on the trials of all groups together.
         X : trials
             As the estimator takes them.
+        y : sequence of length n_sequences, default=None
+            What the trials are told apart by: the group of each. None draws all as one group.
         groups : sequence of length n_sequences, default=None
-            The group of each trial. None draws all as one group.
-        people : sequence of length n_sequences, default=None
             The subject of each trial. Means and bands are of the means of people. By default
             every trial counts as a person.
         signals : trials, default=None
@@ -281,8 +281,8 @@ class GroupDisplay(Display):
         )
         display = display_of_groups(
             aligned,
+            y,
             groups,
-            people,
             comparison,
             features=features,
             statistic=statistic,
@@ -402,8 +402,8 @@ class GroupDisplay(Display):
 
 def display_of_groups(
     aligned,
+    y,
     groups,
-    people,
     comparison,
     *,
     features=None,
@@ -433,15 +433,15 @@ def display_of_groups(
             note += ", ".join(dict.fromkeys(more["feature"]))
     default = dict(zip(aligned.names, aligned.units, strict=True))
     ylabels = labels_of_signals(names, default, ylabel, units)
-    of_people = GroupsOfPeople.of(groups, people, n)
+    of_people = GroupsOfPeople.of(y, groups, n)
     # From the mean of all trials.
     offsets = of_people.means(aligned.offsets - aligned.offsets.mean(axis=0))
     shown = aligned.curves[:, :, chosen]
-    whom = "trials" if people is None else "people"
+    whom = "trials" if groups is None else "people"
     title = _STATISTICS[statistic].format(whom=whom, share=100 * coverage)
     of_groups = []
     for label, (color, line), maker, signals, offset in zip(
-        of_people.describe(people is not None),
+        of_people.describe(groups is not None),
         group_styles(of_people.labels).values(),
         of_people.makers,
         of_people.means(shown),
@@ -461,7 +461,7 @@ def display_of_groups(
         title=f"{title}; {note}" if note else title,
         events=_events_on_clock(events, aligned, of_people),
         comparison=comparison,
-        pairs=people is not None and of_people.are_pairs,
+        pairs=groups is not None and of_people.are_pairs,
     )
 
 

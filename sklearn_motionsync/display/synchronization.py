@@ -127,7 +127,7 @@ class SynchronizationDisplay(Display):
         X: TrialsLike,
         *,
         features: Features | None = None,
-        groups: Labels | None = None,
+        y: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
         ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
@@ -149,9 +149,9 @@ class SynchronizationDisplay(Display):
         features : int, str or list of them, default=None
             Features by index or name, as they reach the synchronizer, such as dimensions of the
             aSpace. By default the first four. What scalers before the synchronizer do is undone.
-        groups : sequence of length n_sequences, default=None
-            The group of each trial, such as ``bunch.actor``. Groups have different colours,
-            and their means are drawn; all are on the clock of the same pattern.
+        y : sequence of length n_sequences, default=None
+            What the trials are told apart by, such as a condition. Each label has a colour, and the
+            mean of its trials is drawn; all are on the clock of the same pattern.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames; per cent of a trial, and of the pattern; or seconds of
             the trials as recorded, and of the median trial on the clock.
@@ -210,7 +210,7 @@ class SynchronizationDisplay(Display):
             labels_of_signals([names[i] for i in chosen], known_units, ylabel, units),
             undo(synchronizer.pattern_)[:, chosen],
             ("as recorded", "the pattern" if index is None else f"the pattern, trial {index}"),
-            None if groups is None else names_of_groups(groups, len(shown)),
+            None if y is None else names_of_groups(y, len(shown), name="y"),
             coverage,
         ).plot(ax, warps=warps)
 
@@ -221,7 +221,7 @@ class SynchronizationDisplay(Display):
         match: Match | NumbersLike,
         *,
         features: Features | None = None,
-        groups: Labels | None = None,
+        y: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
         ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
@@ -241,8 +241,8 @@ class SynchronizationDisplay(Display):
             Such as ``synchronizer.match(X)``; or the warps tau(p) from 0 to P - 1 alone.
         features : int, str or list of them, default=None
             Features by index or name; by default the first four.
-        groups : sequence of length n_sequences, default=None
-            The group of each trial, which determines its colour.
+        y : sequence of length n_sequences, default=None
+            What the trials are told apart by, which determines their colour.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
@@ -291,7 +291,7 @@ class SynchronizationDisplay(Display):
             labels_of_signals([names[i] for i in chosen], known_units, ylabel, units),
             nanmean(after, axis=0),
             ("as recorded", "their mean"),
-            None if groups is None else names_of_groups(groups, len(shown)),
+            None if y is None else names_of_groups(y, len(shown), name="y"),
             coverage,
         ).plot(ax, warps=warps)
 

@@ -21,7 +21,7 @@ from ..inputs.wording import counted
 from ..matching.gaps import fill_with_mean, is_gappy
 from ..synchronizers.match import STANDARD, Match
 from ..utils.doc_links import DocumentedMixin
-from ..utils.groups import encode_groups, group_counts
+from ..utils.groups import encode_groups, group_counts, refuse_classes_as_people
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .acceptance import LEAST, log_moments
@@ -157,8 +157,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised trials; NaN where something was not seen. The rows of a 2-D array
             are univariate ones.
-        y : ignored
-            Present for API consistency.
+        y : array-like, shape (n_sequences,), default=None
+            What the trials are told apart by. Nothing is learnt of it; it refuses ``groups`` that
+            tell the same trials apart.
         groups : array-like, shape (n_sequences,), default=None
             The subject of each trial, or what else makes trials resemble each other,
             such as a session. By default every trial is a group of its own.
@@ -180,7 +181,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             raise ValueError(
                 "A model of how trials vary needs at least 2 trials, got n_samples = 1."
             )
-        encode_groups(groups, len(trials), at_least=2)
+        codes, _ = encode_groups(groups, len(trials), at_least=2)
+        if groups is not None and y is not None:
+            refuse_classes_as_people(encode_groups(y, len(trials), name="y")[0], codes)
         with self._progress(fits=True):
             stream = TrialStream.starting_at(trials[0])
             learnt = self._learn(stream, trials, groups)

@@ -23,7 +23,12 @@ from ..matching.counting import first_largest
 from ..model.action_model import ActionModel
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.doc_links import DocumentedMixin
-from ..utils.groups import add_unknown_label, encode_classes, encode_groups
+from ..utils.groups import (
+    add_unknown_label,
+    encode_classes,
+    encode_groups,
+    refuse_classes_as_people,
+)
 from ..utils.parallel import LongWorkMixin, run
 from ..utils.parameters import validated
 from .distances import PairwiseDistance
@@ -213,7 +218,8 @@ class ActionClassifier(
         ------
         ValueError
             If the input breaks the contract, there are not two classes, there is not a class or
-            group for each trial, or costs are unknown.
+            group for each trial, groups tell the same trials apart as classes, or costs are
+            unknown.
         """
         kernel = MotionKernel(
             self._comparisons(), self.gamma, self.summaries, n_frames=int(self.n_frames)
@@ -222,6 +228,7 @@ class ActionClassifier(
         classes, codes = encode_classes(y, trials, type(self).__name__)
         if groups is not None:
             groups, _ = encode_groups(groups, len(trials), at_least=2)
+            refuse_classes_as_people(codes, groups)
         landmarks = choose_landmarks(codes, groups, self.n_landmarks)
         with self._progress(fits=True) as progress:
             matrix = kernel.fit(

@@ -67,11 +67,11 @@ def write_report(
     path: Path,
     estimator: BaseEstimator,
     X: TrialsLike,
+    y: Labels | None = None,
     *,
     groups: Labels | None = None,
-    people: Labels | None = None,
+    covariate: bool = False,
     paired: bool = False,
-    covariate: ValuesLike | None = None,
     signals: TrialsLike | None = None,
     features: Features | None = None,
     skeleton: Skeleton | None = None,
@@ -95,14 +95,15 @@ def write_report(
         Fitted, as for `compare_groups`.
     X : trials
         As the estimator takes them.
+    y : sequence of length n_sequences, default=None
+        What the trials are told apart by, and compared: the label of the group of each; or with
+        ``covariate`` a number for each, such as speed or age.
     groups : sequence of length n_sequences, default=None
-        The group of each trial: two or more. They are compared.
-    people : sequence of length n_sequences, default=None
         The subject of each trial.
+    covariate : bool, default=False
+        Whether ``y`` are numbers: a regression.
     paired : bool, default=False
-        Whether every person has trials in both of two groups.
-    covariate : array-like of numbers, shape (n_sequences,), default=None
-        Such as speed or age, instead of groups: a regression.
+        Whether every person has trials of both of two labels.
     signals : trials, default=None
         What is shown and compared; by default as in `compare_groups`.
     features : int, str or list of them, default=None
@@ -164,17 +165,19 @@ def write_report(
             frame_rate=frame_rate,
         )
         comparison = None
-        if groups is not None or covariate is not None or paired:
-            study = Study.of(groups, covariate, people, paired, len(aligned.curves))
+        labels = None if covariate else y
+        if y is not None or covariate or paired:
+            n = len(aligned.curves)
+            study = Study.of(y, groups, covariate=covariate, paired=paired, n=n)
             comparison = compare_aligned(aligned, study, random_state=random_state)
-        trials = TrialSet.of(X, aligned, frame_rate, groups, people, covariate)
+        trials = TrialSet.of(X, aligned, frame_rate, labels, groups, y if covariate else None)
         page = Page()
         _add_set(page, trials, estimator, left_out)
         _add_signals(page, trials, features)
         _add_timing(page, trials)
         if comparison is not None:
-            display = display_of_groups(aligned, groups, people, comparison, features=features)
-            _add_test(page, comparison, display.plot().figure_, groups is not None)
+            display = display_of_groups(aligned, labels, groups, comparison, features=features)
+            _add_test(page, comparison, display.plot().figure_, not covariate)
         _add_doubtful(page, trials)
         add_player_of(page, trials, estimator, X, params, skeleton)
     return page.write(path, "Aligned trials" if title is None else title)
@@ -362,15 +365,15 @@ class TrialSet(NamedTuple):
     signals: list
 
     @classmethod
-    def of(cls, X, aligned, frame_rate, groups, people, covariate):
+    def of(cls, X, aligned, frame_rate, y, groups, covariate):
         """Those of the arguments of `write_report`."""
         reached, n = aligned.reached, len(aligned.curves)
-        of_groups = GroupsOfPeople.of(groups, people, n)
+        of_groups = GroupsOfPeople.of(y, groups, n)
         design = {}
+        if y is not None:
+            design["group"] = names_of_groups(y, n, name="y")
         if groups is not None:
-            design["group"] = names_of_groups(groups, n)
-        if people is not None:
-            design["person"] = names_of_groups(people, n, name="people")
+            design["person"] = names_of_groups(groups, n)
         if covariate is not None:
             design["covariate"] = np.asarray(covariate, dtype=float)
         frames = np.array([len(x) for x in reached.trials])

@@ -18,6 +18,7 @@ __all__ = [
     "group_counts",
     "mean_of_others",
     "names_of_groups",
+    "refuse_classes_as_people",
     "sums_of_groups",
 ]
 
@@ -95,6 +96,24 @@ def names_of_groups(groups, n_trials, *, name="groups"):
     """The group of each trial as text, a list; refuses what `encode_groups` refuses."""
     codes, labels = encode_groups(groups, n_trials, name=name)
     return [str(labels[code]) for code in codes]
+
+
+def refuse_classes_as_people(classes, people):
+    """Refuse groups that tell the same trials apart as y does.
+
+    Parameters
+    ----------
+    classes, people : ndarray of int, shape (n_trials,)
+        As `encode_groups` returns them, of y and of groups.
+    """
+    n_classes, n_people = len(np.unique(classes)), len(np.unique(people))
+    n_both = len(np.unique(np.column_stack([classes, people]), axis=0))
+    if n_both == n_classes == n_people < len(classes):
+        raise ValueError(
+            f"groups tells the same {n_people} sets of trials apart as y. y is what trials are "
+            "told apart by, such as a condition, and groups is whose they are: give the person of "
+            "each trial, or leave groups out."
+        )
 
 
 def encode_classes(y, trials, estimator_name):
