@@ -1,7 +1,9 @@
 """How Sphinx builds the site: ``sphinx-build -W --keep-going -b html docs docs/_build/html``."""
 
 import inspect
+import pkgutil
 import sys
+from importlib import import_module
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
@@ -65,10 +67,13 @@ toc_object_entries_show_parents = "hide"
 
 
 def _classes():
-    """Every public class by its full name."""
-    for module in (sklearn_motionsync, sklearn_motionsync.display, sklearn_motionsync.metrics):
-        for name in module.__all__:
-            if inspect.isclass(getattr(module, name)):
+    """Every public class by the name that the reference has for it: at the top, or in its room."""
+    names = [module.name for module in pkgutil.iter_modules(sklearn_motionsync.__path__)]
+    rooms = [import_module(f"sklearn_motionsync.{name}") for name in names]
+    for module in (sklearn_motionsync, *rooms):
+        for name in getattr(module, "__all__", ()):
+            is_at_top = module is not sklearn_motionsync and name in sklearn_motionsync.__all__
+            if inspect.isclass(getattr(module, name)) and not is_at_top:
                 yield f"{module.__name__}.{name}", getattr(module, name)
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 import sklearn_motionsync
-from sklearn_motionsync import datasets, display, io, metrics
+
+from public import ROOMS
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "sklearn_motionsync"
@@ -19,8 +20,8 @@ FLOORS = [
     {"inputs", "utils"},
     {"body", "metrics", "transformers"},
     {"gait", "io", "synchronizers"},
-    {"datasets", "model", "online"},
-    {"comparison", "recognition", "segmentation"},
+    {"datasets", "model", "live"},
+    {"comparison", "recognition", "takes"},
     {"display"},
     {"report"},
 ]
@@ -165,14 +166,37 @@ def test_reference_lists_the_public_names():
     listed = set()
     for block in re.findall(r"```\{eval-rst\}\n(.*?)```", text, re.DOTALL):
         listed |= set(re.findall(r"^   ([A-Za-z_.]+)$", block, re.MULTILINE))
-    rooms = {"datasets": datasets, "display": display, "io": io, "metrics": metrics}
-    public = set(sklearn_motionsync.__all__) - set(rooms)
-    for prefix, room in rooms.items():
-        public |= {f"{prefix}.{name}" for name in room.__all__}
-    assert listed == public
+    top = set(sklearn_motionsync.__all__)
+    rooms = {name: set(module.__all__) - top for name, module in ROOMS.items()}
+    assert listed == top | {f"{room}.{name}" for room, names in rooms.items() for name in names}
+    assert len(top) <= 20
 
 
-@pytest.mark.parametrize("module", [sklearn_motionsync, datasets, display, io, metrics])
+@pytest.mark.parametrize("module", [sklearn_motionsync, *ROOMS.values()])
 def test_public_names_exist(module):
     assert len(set(module.__all__)) == len(module.__all__)
     assert all(hasattr(module, name) for name in module.__all__)
+
+
+@pytest.mark.parametrize("name", sorted(ROOMS))
+def test_rooms_are_there_without_an_import_of_their_own(name):
+    assert getattr(sklearn_motionsync, name) is ROOMS[name]
+    assert name in dir(sklearn_motionsync)
+
+
+@pytest.mark.parametrize(
+    ("name", "now"),
+    [
+        ("find_performances", "takes.find_trials"),
+        ("to_sequences", "to_trials"),
+        ("compare_groups", "comparison.compare_groups"),
+        ("GroupDisplay", "display.GroupDisplay"),
+        ("online", "live"),
+    ],
+)
+def test_old_names_tell_the_new_ones(name, now):
+    message = re.escape(f"sklearn_motionsync.{name} is sklearn_motionsync.{now} now.")
+    with pytest.raises(ImportError, match=message):
+        getattr(sklearn_motionsync, name)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        sklearn_motionsync.nothing  # noqa: B018

@@ -3,16 +3,8 @@
 import inspect
 import re
 
-import sklearn_motionsync
-from sklearn_motionsync import datasets, display, io, metrics
+from public import OBJECTS
 
-ROOMS = (sklearn_motionsync, datasets, display, io, metrics)
-OBJECTS = {
-    name: getattr(room, name)
-    for room in ROOMS
-    for name in room.__all__
-    if not inspect.ismodule(getattr(room, name))
-}
 # Given to every estimator by scikit-learn.
 INHERITED = re.compile("_|set_|get_params$|get_metadata_routing$")
 

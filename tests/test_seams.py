@@ -7,12 +7,13 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-import sklearn_motionsync
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ActionModel, DenseSynchronizer, PartSynchronizer, display
 from sklearn_motionsync.comparison import compare_events, compare_groups, compare_to_norm
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.report import write_report
+
+from public import functions
 
 GAIT = make_gait(8, timing=5, n_frames=60, random_state=0)
 X, GROUP, PERSON = GAIT.data, GAIT.group, GAIT.person
@@ -62,19 +63,12 @@ WITHOUT_KEYFRAMES = {"LagDisplay.from_estimator"}
 
 def test_every_function_has_its_row():
     names = set()
-    for module in (sklearn_motionsync, display):
-        for name in module.__all__:
-            public = getattr(module, name)
-            methods = {name: public}
-            if inspect.isclass(public):
-                methods = {f"{name}.{m}": getattr(public, m) for m in dir(public) if m[0] != "_"}
-            for called, function in methods.items():
-                if not (inspect.isfunction(function) or inspect.ismethod(function)):
-                    continue
-                parameters = inspect.signature(function).parameters
-                takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
-                if takes_any and "frame_rate" in parameters:
-                    names.add(called)
+    for name, function in functions():
+        if inspect.isfunction(function) or inspect.ismethod(function):
+            parameters = inspect.signature(function).parameters
+            takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
+            if takes_any and "frame_rate" in parameters:
+                names.add(name)
     assert names == set(FUNCTIONS) | WITHOUT_KEYFRAMES
 
 

@@ -11,7 +11,7 @@ from sklearn_motionsync.datasets import make_gait
 GAIT = make_gait(16, 2, timing=3, random_state=0)
 K = pd.DataFrame(GAIT.keyframes, columns=GAIT.keyframe_names)
 SHARES = 100 * GAIT.keyframes / [[len(x) - 1] for x in GAIT.data]
-GIVEN = {"groups": GAIT.group, "people": GAIT.person}
+GIVEN = {"y": GAIT.group, "groups": GAIT.person}
 
 
 def of_people(values=SHARES):
@@ -121,8 +121,8 @@ def test_events_that_some_trials_and_people_lack():
         ({"unit": "hours"}, "unit must be one of"),
         ({"unit": "seconds"}, "unit='seconds' needs frame_rate"),
         ({"level": 0}, "level must be a number"),
-        ({"covariate": range(32)}, "Give either groups or a covariate"),
-        ({"groups": ["A"] * 30 + ["B"] * 2, "people": None, "events": K.iloc[:31].reindex(K.index)},
+        ({"y": None, "covariate": True}, "y is needed"),
+        ({"y": ["A"] * 30 + ["B"] * 2, "groups": None, "events": K.iloc[:31].reindex(K.index)},
          "'first force peak' is known in 1 people of group 'B', and at least 2 are needed"),
     ],
 )  # fmt: skip

@@ -74,16 +74,16 @@ def test_deviates_have_the_tail_probabilities_of_the_tests():
     rng = np.random.default_rng(0)
     y, x = rng.standard_normal(15), rng.standard_normal(15)
     groups = np.repeat([0, 1, 2], 5)
-    two = Study.of((groups > 0).tolist(), None, None, False, 15).design
+    two = Study.of((groups > 0).tolist(), None, covariate=False, paired=False, n=15).design
     of_two = stats.ttest_ind(y[5:], y[:5])
     assert deviates(two, y) == pytest.approx(
         np.sign(of_two.statistic) * stats.norm.isf(of_two.pvalue / 2)
     )
-    three = Study.of(groups.tolist(), None, None, False, 15).design
+    three = Study.of(groups.tolist(), None, covariate=False, paired=False, n=15).design
     of_three = stats.f_oneway(*(y[groups == g] for g in range(3)))
     assert deviates(three, y) == pytest.approx(max(stats.norm.isf(of_three.pvalue), 0))
     of_slope = stats.linregress(x, y)
-    found = deviates(Study.of(None, x, None, False, 15).design, y)
+    found = deviates(Study.of(x, None, covariate=True, paired=False, n=15).design, y)
     assert abs(found) == pytest.approx(stats.norm.isf(of_slope.pvalue / 2))
     assert np.sign(found) == np.sign(of_slope.slope)
     flips = Design(np.ones((15, 1)), flips=True)
@@ -94,7 +94,8 @@ def test_deviates_have_the_tail_probabilities_of_the_tests():
 def test_p_values_of_one_value_are_those_of_a_permutation_test():
     rng = np.random.default_rng(3)
     y = rng.standard_normal(14) + np.repeat([0, 0.9], 7)
-    design = Study.of(np.repeat(["a", "b"], 7).tolist(), None, None, False, 14).design
+    labels = ["a"] * 7 + ["b"] * 7
+    design = Study.of(labels, None, covariate=False, paired=False, n=14).design
     curve, quiet = y[:, np.newaxis, np.newaxis], Progress(None, 0)
     found = families(design, [curve], 1999, rng, progress=quiet)[0].p_value
     exact = stats.permutation_test(
@@ -149,7 +150,7 @@ def test_a_bump_in_one_of_four_signals_is_not_called_timing():
         bump = 20 * np.exp(-(((t - 0.2) / 0.06) ** 2) / 2) * (group == "B")
         trials.append(x + bump[:, np.newaxis] * [0, 1, 0, 0])
     pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(trials)
-    given = {"groups": gait.group, "people": gait.person, "n_permutations": 199}
+    given = {"y": gait.group, "groups": gait.person, "n_permutations": 199}
     found = compare_groups(pipe, trials, **given)
     assert found.p_timing < 0.05  # the offsets do differ
     assert set(found.clusters["what"]) == {"shape"}
@@ -220,18 +221,18 @@ def test_designs_find_a_later_bump_and_a_higher_one(design):
     rng, n = np.random.default_rng(5), 12
     people = np.repeat(np.arange(n), 2)
     second = np.tile([0, 1], n)
-    given = {"people": people.tolist(), "n_permutations": 199}
+    given = {"groups": people.tolist(), "n_permutations": 199}
     if design == "paired":
-        by, given = second, {**given, "groups": second.tolist(), "paired": True}
+        by, given = second, {**given, "y": second.tolist(), "paired": True}
     elif design == "within":
         speed = second + 0.2 * rng.standard_normal(2 * n)
-        by, given = speed, {**given, "covariate": speed}
+        by, given = speed, {**given, "y": speed, "covariate": True}
     elif design == "between":
         age = np.repeat(rng.uniform(0, 1, n), 2)
-        by, given = age, {**given, "covariate": age}
+        by, given = age, {**given, "y": age, "covariate": True}
     else:
         by = np.repeat(np.arange(n) % 3, 2) / 2
-        given["groups"] = (2 * by).astype(int).tolist()
+        given["y"] = (2 * by).astype(int).tolist()
     own = np.repeat(rng.normal(0, 0.05, n), 2)
     for what in ("shape", "timing"):
         heights = 1 + own + (0.5 * by if what == "shape" else 0)
@@ -302,7 +303,7 @@ def test_sizes_are_in_the_units_of_the_trials(late, capsys):
     for x in tables:
         x.attrs["units"] = list(gait.units)
     of_tables = clone(pipe).fit(tables)
-    given = {"people": gait.person, "n_permutations": 99, "level": 0.5}
+    given = {"groups": gait.person, "n_permutations": 99, "level": 0.5}
     found = compare_groups(of_tables, tables, gait.group, **given, n_jobs=2, verbose=1)
     assert "[compare_groups] permutations: 100 %" in capsys.readouterr().out
     plain = compare_groups(pipe, gait.data, gait.group, **given, signals=gait.data)
@@ -363,33 +364,43 @@ GROUPS = ["a", "b"] * 8
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({}, "Give either groups or a covariate"),
-        ({"groups": GROUPS, "covariate": range(16)}, "Give either groups or a covariate"),
+        ({"y": None}, "y is needed"),
+        ({"y": [k + 0.5 for k in range(16)]}, "numbers such as 0.5, which are no labels"),
+        ({"y": GROUPS, "groups": GROUPS}, "the same 2 sets of trials apart as y"),
         (
-            {"groups": ["a"] * 15 + ["b"]},
+            {"y": ["a"] * 15 + ["b"]},
             "At least two people a group are needed, got 15 in 'a', 1",
         ),
-        ({"groups": GROUPS, "people": PAIRS}, "'p0' has trials in several groups. Set paired=True"),
-        ({"groups": GROUPS, "paired": True}, "paired=True needs people and two groups"),
+        ({"y": GROUPS, "groups": PAIRS}, "'p0' has trials of several labels in y. Set paired=True"),
         (
-            {"groups": GROUPS[:15] + ["a"], "people": PAIRS, "paired": True},
+            {"y": GROUPS, "paired": True},
+            "needs two labels in y, got 2, and groups=, .* missing",
+        ),
+        (
+            {"y": GROUPS[:15] + ["a"], "groups": PAIRS, "paired": True},
             "'p7' has no trial in group 'b'",
         ),
-        ({"covariate": range(16), "paired": True}, "needs two groups, not a covariate"),
-        ({"covariate": range(5)}, r"one number for each of 16 trials, got shape \(5,\)"),
-        ({"covariate": [1.0] * 16}, "must differ between trials"),
-        ({"covariate": [np.nan] * 16}, "must be finite"),
-        ({"covariate": range(16), "people": ["x"] * 8 + ["y"] * 8}, "At least 4 people are needed"),
-        ({"groups": GROUPS, "level": 5}, "level must be a number between 0 and 1"),
         (
-            {"groups": GROUPS, "n_permutations": 9},
+            {"y": range(16), "covariate": True, "paired": True},
+            "groups of trials, not a covariate",
+        ),
+        ({"y": range(5), "covariate": True}, r"one number for each of 16 trials, got shape \(5,\)"),
+        ({"y": [1.0] * 16, "covariate": True}, "must differ between trials"),
+        ({"y": [np.nan] * 16, "covariate": True}, "must be finite"),
+        (
+            {"y": range(16), "covariate": True, "groups": [0, 1] * 8},
+            "At least 4 people are needed",
+        ),
+        ({"y": GROUPS, "level": 5}, "level must be a number between 0 and 1"),
+        (
+            {"y": GROUPS, "n_permutations": 9},
             "n_permutations must be a whole number of at least 19",
         ),
-        ({"groups": GROUPS, "unit": "hours"}, "unit must be one of"),
-        ({"groups": GROUPS, "unit": "seconds"}, "needs X and frame_rate"),
-        ({"groups": GROUPS, "signals": [np.ones((5, 1))] * 3}, "one sequence for each of 16 perf"),
-        ({"groups": GROUPS, "signals": [np.full((5, 1), np.nan)] * 16}, "Trial 0, frame"),
-        ({"groups": GROUPS, "features": "knee"}, "knee"),
+        ({"y": GROUPS, "unit": "hours"}, "unit must be one of"),
+        ({"y": GROUPS, "unit": "seconds"}, "needs X and frame_rate"),
+        ({"y": GROUPS, "signals": [np.ones((5, 1))] * 3}, "one sequence for each of 16 perf"),
+        ({"y": GROUPS, "signals": [np.full((5, 1), np.nan)] * 16}, "Trial 0, frame"),
+        ({"y": GROUPS, "features": "knee"}, "knee"),
     ],
 )
 def test_refused_arguments(given, message, few):
@@ -402,15 +413,15 @@ def share_of_most_extreme(statistics):
     return np.isclose(statistics, max(statistics)).mean()
 
 
-def by_all_arrangements(groups=None, covariate=None):
+def by_all_arrangements(y, covariate=False):
     """The share of arrangements that separate units as well as the best one."""
-    if groups is not None:
-        groups = np.array(groups)
+    if not covariate:
+        groups = np.array(y)
         arranged = [groups[list(order)] for order in permutations(range(len(groups)))]
         return share_of_most_extreme(
             [-sum(groups[labels == k].var() for k in set(groups)) for labels in arranged]
         )
-    centred = np.array(covariate) - np.mean(covariate)
+    centred = np.array(y) - np.mean(y)
     orders = permutations(range(len(centred)))
     return share_of_most_extreme([abs(centred @ centred[list(order)]) for order in orders])
 
@@ -418,18 +429,17 @@ def by_all_arrangements(groups=None, covariate=None):
 @pytest.mark.parametrize(
     "of",
     [
-        {"groups": [0, 0, 1, 1]},
-        {"groups": [0, 0, 0, 1, 1]},
-        {"groups": [0, 0, 1, 1, 2, 2]},
-        {"covariate": [1.0, 2, 3, 4]},
-        {"covariate": [1.0, 2, 3, 7]},
-        {"covariate": [1.0, 1, 2, 5]},
+        {"y": [0, 0, 1, 1]},
+        {"y": [0, 0, 0, 1, 1]},
+        {"y": [0, 0, 1, 1, 2, 2]},
+        {"y": [1.0, 2, 3, 4], "covariate": True},
+        {"y": [1.0, 2, 3, 7], "covariate": True},
+        {"y": [1.0, 1, 2, 5], "covariate": True},
     ],
 )
 def test_smallest_p_is_that_of_all_arrangements(of):
-    given = {"groups": None, "covariate": None} | of
-    n = len(next(iter(of.values())))
-    study = Study.of(given["groups"], given["covariate"], None, False, n)
+    given = {"covariate": False} | of
+    study = Study.of(**given, groups=None, paired=False, n=len(of["y"]))
     assert study.smallest_p == pytest.approx(by_all_arrangements(**of))
 
 
@@ -441,7 +451,7 @@ def test_too_few_people_are_told_so():
         X = [curve[:, np.newaxis] for curve in curves]
         sync = LinearSynchronizer(50).fit(X)
         people = np.repeat(np.arange(n), 2)
-        given = {"people": people, "paired": True, "n_permutations": 199}
+        given = {"groups": people, "paired": True, "n_permutations": 199}
         found = compare_groups(sync, X, ["a", "b"] * n, **given)
         assert f": {words}" in found.describe()
         assert found.smallest_p == 2 / 2**n

@@ -161,13 +161,13 @@ def test_without_people_names_units_and_seconds():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"norm": "C"}, r"norm='C' is none of the groups \['A', 'B'\]"),
-        ({"groups": ["A"] * 48}, "groups: all labels are equal"),
-        ({"groups": ["A"] * 4 + ["B"] * 44}, "needs at least 3 people, got 2 in 'A'"),
-        ({"people": [0] * 48}, "people: all labels are equal"),
+        ({"norm": "C"}, r"norm='C' is none of the labels \['A', 'B'\] in y"),
+        ({"y": ["A"] * 48}, "y: all labels are equal"),
+        ({"y": ["A"] * 4 + ["B"] * 44}, "needs at least 3 people, got 2 in 'A'"),
+        ({"groups": [0] * 48}, "groups: all labels are equal"),
         (
-            {"groups": ["A", "B"] * 24},
-            r"'person0' has trials in the groups \['A', 'B'\]\. Give people one name a group, such",
+            {"y": ["A", "B"] * 24},
+            r"'person0' has trials of the labels \['A', 'B'\] in y\. Give people one name a label",
         ),
         ({"level": 2}, "level must be a number between 0 and 1"),
         ({"unit": "hours"}, "unit must be one of"),
@@ -176,6 +176,6 @@ def test_without_people_names_units_and_seconds():
 )
 def test_refused_arguments(late, given, message):
     gait, pipe = late
-    defaults = {"groups": gait.group, "norm": "A", "people": gait.person}
+    defaults = {"y": gait.group, "norm": "A", "groups": gait.person}
     with pytest.raises(ValueError, match=message):
         compare_to_norm(pipe, gait.data, **(defaults | given))

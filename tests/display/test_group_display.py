@@ -18,7 +18,7 @@ GAIT = make_gait(14, 2, timing=6, amplitude=20, random_state=0)
 TRIALS = [pd.DataFrame(x, columns=GAIT.feature_names) for x in GAIT.data]
 for x in TRIALS:
     x.attrs["units"] = list(GAIT.units)
-GIVEN = {"groups": GAIT.group, "people": GAIT.person}
+GIVEN = {"y": GAIT.group, "groups": GAIT.person}
 
 
 @pytest.fixture(scope="module")
@@ -192,7 +192,7 @@ def test_signals_are_what_reaches_an_aspace():
         ({"unit": "seconds"}, "frame_rate"),
         ({"signals": TRIALS[:3]}, "one sequence for each of 28 trials, got 3"),
         ({"events": np.ones((3, 1))}, "events must be a list of 28 arrays"),
-        ({"groups": ["A"]}, "groups must have one label"),
+        ({"y": ["A"]}, "groups must have one label"),
     ],
 )
 def test_refused_arguments(pipe, given, message):

@@ -31,7 +31,7 @@ GAIT = make_gait(8, 2, timing=8, random_state=0)
 TRIALS = [pd.DataFrame(x, columns=GAIT.feature_names) for x in GAIT.data]
 for k, x in enumerate(TRIALS):
     x.attrs |= {"units": list(GAIT.units), "trial": f"walk {k}", "frame_rate": 100.0}
-GIVEN = {"groups": GAIT.group, "people": GAIT.person}
+GIVEN = {"y": GAIT.group, "groups": GAIT.person}
 SYNC = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(51)).fit(TRIALS)
 # It is quick, and compares nothing again without some of its features.
 LINEAR = LinearSynchronizer(20).fit(TRIALS)
@@ -333,9 +333,9 @@ def test_figures_of_the_user_stay_and_own_ones_are_closed(tmp_path):
     ("given", "error", "message"),
     [
         ({"left_out": ["walk 3"]}, ValueError, r"left_out must be a mapping .* got \['walk 3'\]"),
-        ({"groups": ["A"]}, ValueError, "groups must have one label"),
-        ({"groups": GAIT.group, "covariate": np.arange(16)}, ValueError, "Give either groups or"),
-        ({"paired": True}, ValueError, "Give either groups or a covariate"),
+        ({"y": ["A"]}, ValueError, "y must have one label"),
+        ({"y": None, "covariate": True}, ValueError, "y is needed"),
+        ({"paired": True}, ValueError, "y is needed"),
         ({"unit": "minutes"}, ValueError, "unit must be one of"),
         ({"skeleton": "acclaim"}, ValueError, "skeleton must be a Skeleton"),
         ({"speed": 3}, TypeError, "write_report got 'speed'"),

@@ -1,6 +1,7 @@
 """Groups and classes: every public method that takes them encodes and refuses the same."""
 
 import inspect
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,10 +16,6 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     LinearSynchronizer,
     PartSynchronizer,
-    datasets,
-    display,
-    io,
-    metrics,
 )
 from sklearn_motionsync.comparison import compare_events, compare_groups, compare_to_norm
 from sklearn_motionsync.display import (
@@ -30,6 +27,8 @@ from sklearn_motionsync.live import MotionTracker
 from sklearn_motionsync.report import write_report
 from sklearn_motionsync.takes import find_trials
 from sklearn_motionsync.utils.groups import encode_classes, encode_groups, names_of_groups
+
+from public import functions
 
 N, T = 6, np.linspace(0, 1, 20)
 X = np.stack([a * np.column_stack([np.sin(5 * T), T**2]) for a in (0.8, 0.9, 1.0, 1.1, 1.2, 1.3)])
@@ -61,44 +60,44 @@ METHODS = {
     "ActionClassifier.fit(y)": (lambda y: ActionClassifier([], n_frames=10).fit(X, y), True),
     "MotionTracker.fit(groups)": (lambda g: MotionTracker(SYNC, 20).fit(X, groups=g), True),
     "PartSynchronizer.lags(groups)": (lambda g: PARTS.lags(X, groups=g), False),
-    "compare_events(groups)": (
+    "compare_events(y)": (
         lambda g: compare_events(X, EVENTS, g, n_permutations=19),
         True,
     ),
-    "compare_events(people)": (
+    "compare_events(groups)": (
         lambda p: compare_events(X, EVENTS, [0, 0, 0, 1, 1, 1], groups=p, n_permutations=19),
         True,
     ),
-    "compare_groups(groups)": (lambda g: compare_groups(SYNC, X, g, n_permutations=19), True),
-    "compare_groups(people)": (
+    "compare_groups(y)": (lambda g: compare_groups(SYNC, X, g, n_permutations=19), True),
+    "compare_groups(groups)": (
         lambda p: compare_groups(SYNC, X, [0, 0, 0, 1, 1, 1], groups=p, n_permutations=19),
         True,
     ),
-    "compare_to_norm(groups)": (lambda g: compare_to_norm(SYNC, X, g, norm=first_of(g)), True),
-    "compare_to_norm(people)": (
+    "compare_to_norm(y)": (lambda g: compare_to_norm(SYNC, X, g, norm=first_of(g)), True),
+    "compare_to_norm(groups)": (
         lambda p: compare_to_norm(SYNC, X, [0, 0, 0, 1, 1, 1], norm=0, groups=p),
         True,
     ),
-    "GroupDisplay.from_estimator(groups)": (
+    "GroupDisplay.from_estimator(y)": (
         lambda g: GroupDisplay.from_estimator(SYNC, X, g),
         False,
     ),
-    "GroupDisplay.from_estimator(people)": (
+    "GroupDisplay.from_estimator(groups)": (
         lambda p: GroupDisplay.from_estimator(SYNC, X, groups=p),
         False,
     ),
-    "write_report(groups)": (lambda g: report(groups=g), True),
-    "write_report(people)": (lambda p: report(people=p), False),
+    "write_report(y)": (lambda g: report(y=g), True),
+    "write_report(groups)": (lambda p: report(groups=p), False),
     "find_trials(groups)": (lambda g: find_trials(SYNC, X[0], groups=g), True),
     "LagDisplay.from_estimator(groups)": (
         lambda g: LagDisplay.from_estimator(PARTS, X, groups=g),
         False,
     ),
-    "SynchronizationDisplay.from_estimator(groups)": (
+    "SynchronizationDisplay.from_estimator(y)": (
         lambda g: SynchronizationDisplay.from_estimator(SYNC, X, y=g),
         False,
     ),
-    "SynchronizationDisplay.from_predictions(groups)": (
+    "SynchronizationDisplay.from_predictions(y)": (
         lambda g: SynchronizationDisplay.from_predictions(X, SYNC.match(X).times, y=g),
         False,
     ),
@@ -120,37 +119,29 @@ REFUSED = [
 ]
 
 
-def public_methods():
-    """Public methods and functions with a parameter that holds groups, as METHODS names them."""
-    import sklearn_motionsync
-
-    for module in (sklearn_motionsync, datasets, display, io, metrics):
-        for name in module.__all__:
-            thing = getattr(module, name)
-            members = {"": thing}
-            if inspect.isclass(thing):
-                members = {
-                    f".{key}": value
-                    for key, value in inspect.getmembers(thing, inspect.isroutine)
-                    if not key.startswith(("_", "set_"))
-                }
-            for key, value in members.items():
-                try:
-                    parameters = inspect.signature(value).parameters
-                except (TypeError, ValueError):
-                    continue
-                for parameter in {"groups", "people"} & set(parameters):
-                    yield f"{name}{key}({parameter})"
+# Labels of anything are checked there as here; of these y is not used, or what scikit-learn checks.
+OF_OTHERS = {"ActionDetector.fit(y)", "ActionModel.fit(y)", "ActionModel.partial_fit(y)"}
 
 
-def test_every_public_method_with_groups_is_tested():
-    assert set(public_methods()) == set(METHODS) - {"ActionClassifier.fit(y)"}
+def methods_with_labels():
+    """Public methods and functions that take labels of trials, as METHODS names them."""
+    for name, each in functions():
+        with suppress(TypeError, ValueError):
+            parameters = inspect.signature(each).parameters
+            if "groups" in parameters:
+                yield from (f"{name}({p})" for p in ("y", "groups") if p in parameters)
+            elif "y" in parameters and parameters["y"].annotation == "Labels | None":
+                yield f"{name}(y)"
+
+
+def test_every_public_method_with_labels_is_tested():
+    assert set(methods_with_labels()) - OF_OTHERS == set(METHODS) - OF_OTHERS
 
 
 @pytest.mark.parametrize(("labels", "message"), REFUSED)
 def test_what_is_no_label_for_each_trial_is_refused(labels, message):
-    with pytest.raises(ValueError, match=message.format("people")):
-        encode_groups(labels, N, name="people")
+    with pytest.raises(ValueError, match=message.format("groups")):
+        encode_groups(labels, N)
     # The shape of y is checked as in scikit-learn.
     if "missing" in message or "one type" in message:
         with pytest.raises(ValueError, match=message.format("y")):
