@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from numbers import Integral, Real
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -380,3 +381,28 @@ def _list_events(data, strikes, keyframes, frame_rate):
         for label, at in sorted(marked, key=lambda event: event[1])
         if 0 <= at <= len(data) - 1
     ]
+
+
+def gait_csv() -> Path:
+    """The path of a CSV file of made gait that ships with the package.
+
+    It has one row a frame: the columns ``group``, ``subject``, ``trial`` and ``time`` in seconds,
+    and one column a signal: ``hip_flexion``, ``knee_flexion`` and ``ankle_dorsiflexion`` in degrees
+    and ``vertical_force`` in body weights. There are three strides of each of ten people. Those of
+    group B push off later, by 6 % of the stride: ``make_gait(timing=6, random_state=0)``.
+
+    Returns
+    -------
+    Path
+        Of the file.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from sklearn_motionsync import to_trials
+    >>> from sklearn_motionsync.datasets import gait_csv
+    >>> trials = to_trials(pd.read_csv(gait_csv()), by=["group", "subject", "trial"], time="time")
+    >>> trials.labels.groupby("group", sort=False)["subject"].nunique().to_dict()
+    {'A': 5, 'B': 5}
+    """
+    return Path(__file__).with_name("gait.csv")

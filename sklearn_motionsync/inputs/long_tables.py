@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Hashable, Sequence
+from numbers import Integral
 
 import numpy as np
 import pandas as pd
@@ -31,6 +32,7 @@ from .tables import (
     is_nested,
     labelled,
     labels_given,
+    labels_of,
     own_label,
     rows_of_labels,
     split_table,
@@ -39,7 +41,7 @@ from .tables import (
 from .types import Labels, Table, TrialsLike
 from .wording import counted
 
-__all__ = ["to_frame", "to_trials"]
+__all__ = ["TrialList", "to_frame", "to_trials"]
 
 # What to do with times that are no frames.
 _EVENTS = (
@@ -55,8 +57,8 @@ def to_trials(
     *,
     frame_rate: float | None = None,
     max_gap_time: float | None = None,
-) -> list[pd.DataFrame]:
-    """Turn a table of frames into a list of trials.
+) -> TrialList:
+    """Turn a table of frames into a list of trials, with a table of their labels.
 
     Do this *before* cross-validation: scikit-learn would split the table by row. Estimators warn of
     rows split at random. Every second row passes: it is a lower frame rate.
@@ -88,6 +90,10 @@ def to_trials(
     Returns
     -------
     list of DataFrame
+        Its attribute ``labels`` is a table with a row a trial and a column for each of ``by``, such
+        as the condition and the subject of each. A slice of the list, and a choice by an array of
+        indices or of booleans, keeps its labels.
+
         One ``(n_frames_i, n_features)`` frame a trial, in order of first appearance, indexed
         by the frame level, the time, or 0, 1, ... What ``by`` and ``time`` name are no features.
         ``attrs["trial"]`` is the label, a tuple if several levels name the trial,
@@ -123,8 +129,10 @@ def to_trials(
     ...     "knee": [3, 1, 4, 5, 8],
     ... })
     >>> trials = to_trials(df, by=["subject", "trial"], time="time")
-    >>> [x.attrs["trial"] for x in trials]
-    [('ann', 1), ('ann', 2)]
+    >>> trials.labels
+      subject  trial
+    0     ann      1
+    1     ann      2
     >>> to_frame(trials)["knee"]
     subject  trial  time
     ann      1      0.000    1.0
@@ -134,7 +142,39 @@ def to_trials(
                     0.250    8.0
     Name: knee, dtype: float64
     """
-    df = _as_table(df)
+    return TrialList(_trials_of(_as_table(df), by, time, frame_rate, max_gap_time))
+
+
+class TrialList(list):
+    """Trials of a table, as a list, and the table of their labels.
+
+    Parameters
+    ----------
+    trials : iterable of DataFrame, each (n_frames_i, n_features)
+    labels : DataFrame, shape (n_trials, n_levels), default=None
+        By default what the trials carry in their ``attrs``, or their numbers.
+    """
+
+    def __init__(self, trials, labels=None):
+        super().__init__(trials)
+        if labels is None:
+            values, (*levels, _) = labels_of(list(self))
+            rows = values if len(levels) > 1 else [(value,) for value in values]
+            labels = pd.DataFrame(rows, columns=levels)
+        self.labels = labels
+
+    def __getitem__(self, index):
+        if isinstance(index, Integral):
+            return super().__getitem__(index)
+        rows = np.arange(len(self))[index]
+        return TrialList([self[int(row)] for row in rows], self.labels.iloc[rows])
+
+    def _repr_html_(self):
+        """The labels and lengths of the trials, for notebooks."""
+        return self.labels.assign(n_frames=[len(x) for x in self]).to_html(max_rows=10)
+
+
+def _trials_of(df, by, time, frame_rate, max_gap_time):
     for name, value in (("frame_rate", frame_rate), ("max_gap_time", max_gap_time)):
         if value is not None and not is_rate(value):
             raise ValueError(

@@ -2,6 +2,7 @@
 
 import datetime as dt
 import io
+import pickle
 import re
 
 import numpy as np
@@ -742,3 +743,36 @@ def test_tables_of_spikes_are_refused():
         df = pd.DataFrame({"trial": 1, "unit": 3, "spike_time": time})
         with pytest.raises(ValueError, match=rf"{message}.*such as spikes, become rates first"):
             to_trials(df, by=["trial", "unit"], time="spike_time")
+
+
+# -- labels beside the trials ---------------------------------------------------------------
+
+
+def test_labels_stay_with_slices_and_choices():
+    rows = [("b", "ann", 1), ("b", "ann", 2), ("a", "bob", 1), ("a", "cy", 3)]
+    table = pd.DataFrame(rows, columns=["group", "subject", "trial"]).loc[np.repeat(range(4), 3)]
+    table["time"], table["knee"] = np.tile([0.0, 0.1, 0.2], 4), np.arange(12.0)
+    keys = ["group", "subject", "trial"]
+    trials = to_trials(table, by=keys, time="time")
+    assert isinstance(trials, list)
+    assert list(trials.labels.itertuples(index=False, name=None)) == rows
+    chosen = {
+        "slice": (trials[1:3], [1, 2]),
+        "mask": (trials[trials.labels["group"] == "a"], [2, 3]),
+        "indices": (trials[[3, 0]], [3, 0]),
+        "pickled": (pickle.loads(pickle.dumps(trials)), [0, 1, 2, 3]),
+    }
+    for some, expected in chosen.values():
+        assert [tuple(row) for row in some.labels.to_numpy()] == [rows[i] for i in expected]
+        for x, i in zip(some, expected, strict=True):
+            pd.testing.assert_frame_equal(x, trials[i])
+    assert trials[-1] is trials[3]
+    assert "n_frames" in trials._repr_html_()
+    assert "<td>bob</td>" in trials._repr_html_()
+
+
+def test_trials_of_one_level_or_of_none_have_labels():
+    table = pd.DataFrame({"trial": [*"aabb"], "x": range(4)})
+    assert to_trials(table, by="trial").labels.to_dict("list") == {"trial": ["a", "b"]}
+    alone = to_trials(pd.DataFrame({"time": [0, 1], "x": [1, 2]}), time="time")
+    assert alone.labels.to_dict("list") == {"trial": [0]}
