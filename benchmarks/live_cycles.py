@@ -7,12 +7,11 @@ cuts from the takes of others. A minute is chained from the cycles of the person
 strikes cut them (cycles.py): each is drawn to the beginning of the next, the pace goes from 0.75 to
 1.25 of its own within 20 seconds, the body travels, turns round twice, and begins in mid-cycle. The
 truth is a line between foot strikes; the phase of the other foot is that of the training cycles.
-Errors are in per cent of a cycle,
-from the second cycle on. A strike is told when the number of the cycle rises; it is missed where
-none is within a quarter of a cycle. The walks of CMU are of one person, so that takes are held out.
-UTKinect has one or two cycles a take, and many of its strikes are no strikes: four of ten people
-have a cycle with the other foot in its middle. By how much intervals of cycles are widened was
-chosen on these sets. Takes four minutes.
+Errors are in per cent of a cycle, from the second cycle on. A strike is told when the number of the
+cycle rises; it is missed where none is within a quarter of a cycle. The walks of CMU are of one
+person, so that takes are held out. UTKinect has one or two cycles a take, and many of its strikes
+are no strikes: four of ten people have a cycle with the other foot in its middle. By how much
+intervals of cycles are widened was chosen on these sets. Takes four minutes.
 """
 
 import warnings

@@ -77,10 +77,9 @@ def make_bending(
 ) -> Bunch:
     """Trials of a bending action, with the true warps and key-frames.
 
-    A skeleton of fifteen joints stands, bends down until its right hand is near the
-    floor, and rises again. Every actor has a body and a style; every trial has a pace (a
-    smooth random warp), a duration, a place and a heading, and the noise of a motion capture
-    system.
+    A skeleton of fifteen joints stands, bends down until its right hand is near the floor, and
+    rises again. Every actor has a body and a style; every trial has a pace (a smooth random warp),
+    a duration, a place and a heading, and the noise of a motion capture system.
 
     Parameters
     ----------

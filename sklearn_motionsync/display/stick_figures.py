@@ -82,8 +82,7 @@ class SkeletonDisplay(MovingDisplay):
         The duration of each trial of each panel in frames; by default its number of frames
         less one.
     labels : list of str, default=None
-        Names under the trials of a panel, which are then side by side instead of in one
-        place.
+        Names under the trials of a panel, which are then side by side instead of in one place.
     marked : list of list of (int, int), default=None
         The violet bones of each panel, such as those of limbs that depart from the action: pairs
         of ``skeleton.bones``. All others are grey.

@@ -67,10 +67,9 @@ def to_trials(
     ----------
     df : DataFrame of pandas or polars, or DataArray of xarray
         One row a frame. Without ``by`` and ``time`` its index has two levels or more: the last is
-        the frame, increasing within each trial, and those before it name the trial.
-        Times there that are not even are warned of. A table with a row a trial and a series
-        in each cell, and an array with the dimensions of trials, ``time`` and features, are
-        made into such a table.
+        the frame, increasing within each trial, and those before it name the trial. Times there
+        that are not even are warned of. A table with a row a trial and a series in each cell, and
+        an array with the dimensions of trials, ``time`` and features, are made into such a table.
     by : str or list of str, default=None
         Columns or index levels that together tell trials apart; rows of one trial
         need not be neighbours. By default the levels of the index before the last; a table
@@ -105,9 +104,8 @@ def to_trials(
     Raises
     ------
     ValueError
-        If there is no such column or level, a key or a time is missing, a time of a trial
-        comes twice, or there is a gap; without ``time``, if the frames of a trial do not
-        increase.
+        If there is no such column or level, a key or a time is missing, a time of a trial comes
+        twice, or there is a gap; without ``time``, if the frames of a trial do not increase.
 
     See Also
     --------

@@ -39,8 +39,7 @@ _FORGETTING = 3
 class LivePhase(NamedTuple):
     """The phase of a running trial, its rate, and how sure it is.
 
-    All values have the shape of the phase: numbers of a frame, arrays of several frames or
-    trials.
+    All values have the shape of the phase: numbers of a frame, arrays of several frames or trials.
 
     Parameters
     ----------

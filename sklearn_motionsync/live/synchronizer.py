@@ -62,8 +62,7 @@ class OnlineSynchronizer(
     Parameters
     ----------
     synchronizer : Synchronizer, default=None
-        Synchronises the training trials; a clone of it is fitted. None is
-        ``DenseSynchronizer()``.
+        Synchronises the training trials; a clone of it is fitted. None is ``DenseSynchronizer()``.
     frame_rate : float, default=None
         Frames a second of the training trials. Times are then in seconds; without it
         in frames of the training trials.

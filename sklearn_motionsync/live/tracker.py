@@ -52,8 +52,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
        particles share one Kalman gain.
     4. The weights are likelihoods of causal velocities, compared with those of the mean along the
        path of the particle. The style of a person persists, so frames are not independent:
-       log-likelihoods of poses are not used, and those of velocities are divided by
-       ``tempering``.
+       log-likelihoods of poses are not used, and those of velocities are divided by ``tempering``.
     5. A second Kalman filter knows no phase: deviations are those from the mean of all frames. Both
        estimates are multiplied as densities, each to the power of its weight. The weights are 3 to
        1, divided by the mean variance of each estimate. The covariance of either is larger by its
@@ -65,8 +64,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     Parameters
     ----------
     synchronizer : synchronizer, default=None
-        Synchronises the training trials; a clone of it is fitted. None is
-        `DenseSynchronizer()`.
+        Synchronises the training trials; a clone of it is fitted. None is `DenseSynchronizer()`.
     n_particles : int, default=500
         Particles of phase and rate.
     noise : float or JointNoise, default=0.05

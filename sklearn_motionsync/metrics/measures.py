@@ -102,8 +102,7 @@ def keyframe_error(
     Raises
     ------
     ValueError
-        If the numbers of warps, key-frames and lengths differ, or a key-frame is outside its
-        trial.
+        If the numbers of warps, key-frames and lengths differ, or a key-frame is outside its trial.
 
     Examples
     --------

@@ -234,10 +234,9 @@ class Contrast:
     """How much a trial is the action rather than its image under an exchange.
 
     An exchange is one that undoes itself, such as left for right. The differences ``d`` of training
-    trials from their images have a mean ``m``. The contrast of a trial is
-    ``<d, m> / (|m|^2 + c)``: about 1 for the action and -1 for its image, and 0 where the action
-    is its own image. ``c`` is a share of the variance of d, so that a mean that is noise counts
-    little.
+    trials from their images have a mean ``m``. The contrast of a trial is ``<d, m> / (|m|^2 + c)``:
+    about 1 for the action and -1 for its image, and 0 where the action is its own image. ``c`` is a
+    share of the variance of d, so that a mean that is noise counts little.
 
     Parameters
     ----------

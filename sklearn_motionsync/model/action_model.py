@@ -490,8 +490,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         random_state : int, RandomState instance or None, default=0
             Draws the bootstrap samples.
         match : Match, default=None
-            Of the training trials, by the `DenseSynchronizer` that the model was fitted
-            after.
+            Of the training trials, by the `DenseSynchronizer` that the model was fitted after.
 
         Returns
         -------
@@ -537,13 +536,12 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     ) -> np.ndarray:
         """Draw accepted poses at a frame (Fig. 4), or whole trials.
 
-        Both are drawn about those of training trials chosen at random, with mean, variance
-        and covariance of all, so that features keep their correlations and styles do not mix.
-        Poses are truncated at the envelope. Trials are accepted by `predict`; one that
-        would be rejected is moved towards its training trial. Features that are
-        directions, such as those of `DirectionCosines`, are mixed on the sphere and keep the
-        length 1. Dimensions of an `ASpace` are no directions: there, limbs get their length
-        from ``inverse_transform`` of the cosines.
+        Both are drawn about those of training trials chosen at random, with mean, variance and
+        covariance of all, so that features keep their correlations and styles do not mix. Poses are
+        truncated at the envelope. Trials are accepted by `predict`; one that would be rejected is
+        moved towards its training trial. Features that are directions, such as those of
+        `DirectionCosines`, are mixed on the sphere and keep the length 1. Dimensions of an `ASpace`
+        are no directions: there, limbs get their length from ``inverse_transform`` of the cosines.
 
         Parameters
         ----------

@@ -197,9 +197,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         y : array-like, default=None
             Passed to the pipeline; ignored by the detector.
         groups : array-like, shape (n_sequences,), default=None
-            The subject of each trial, or what else makes trials resemble each other.
-            The model of the pipeline gets them, too. By default every trial is a group of
-            its own.
+            The subject of each trial, or what else makes trials resemble each other. The model of
+            the pipeline gets them, too. By default every trial is a group of its own.
         **params : dict
             What the ``fit`` of the pipeline takes besides: by the names of steps, or routed
             metadata.

@@ -419,8 +419,7 @@ def _energies_of_seen(on_clock):
 class TrialStream:
     """Mean and variance of trials, and a sample of at most 64 of them.
 
-    All but ``dropped`` is the same, to the last bit, however trials are divided into
-    portions.
+    All but ``dropped`` is the same, to the last bit, however trials are divided into portions.
 
     Attributes
     ----------

@@ -334,8 +334,7 @@ def sample_trials(mean, variance, deviations, n, dissimilarity, threshold, rando
     Returns
     -------
     ndarray, shape (n, P, n_features), of the mean's dtype
-        If no training trial is inside, their dissimilarity is up to that of the most
-        typical one.
+        If no training trial is inside, their dissimilarity is up to that of the most typical one.
     """
     space = TangentSpace(mean, deviations)
     known = space.coordinates

@@ -89,9 +89,8 @@ class ActionClassifier(
     n_frames : int, default=50
         ``P``, frames of the common clock. Time grows with its square.
     reject_below : float, "auto" or None, default=None
-        Trials whose largest decision value is below get ``unknown_label``; None rejects
-        nothing. ``"auto"`` is ``threshold_at(0.95)``. ``fit`` does not use it: it can be set
-        afterwards.
+        Trials whose largest decision value is below get ``unknown_label``; None rejects nothing.
+        ``"auto"`` is ``threshold_at(0.95)``. ``fit`` does not use it: it can be set afterwards.
     unknown_label : label, default=None
         The label of rejected trials, which is none of the classes; by default "unknown" among
         text, -1 among numbers, NaT among dates.

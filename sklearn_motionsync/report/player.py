@@ -67,8 +67,7 @@ def write_player(
         Of the file, such as ``"squats.html"``. Its folder must exist. A file that is there already
         is replaced once the new one is complete.
     X : list of arrays (n_frames_i, n_dims * n_joints)
-        Joint positions of 1 to 24 trials, of two frames or more. NaN where a joint was not
-        seen.
+        Joint positions of 1 to 24 trials, of two frames or more. NaN where a joint was not seen.
     skeleton : Skeleton or None
         None shows the joints as points without bones, y up.
     match : Match, synchronizer or Pipeline with one, default=None

@@ -96,8 +96,7 @@ class Synchronizer(
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        Sum of the squared distances of each trial to all others; NaN if the pattern was
-        given.
+        Sum of the squared distances of each trial to all others; NaN if the pattern was given.
     lengths_ : ndarray of int, shape (n_sequences,)
         Numbers of frames of the training trials.
     examples_ : ndarray, shape (min(n_sequences, 64), P, n_features)
@@ -223,10 +222,9 @@ class Synchronizer(
         Returns
         -------
         Match
-            ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
-            the pattern, both of trials linearly normalised to its length (Eq. 7), and
-            ``distances``, shape (n_sequences,). tau is non-decreasing, ``tau(0) = 0``,
-            ``tau(P-1) = P-1``.
+            ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of the
+            pattern, both of trials linearly normalised to its length (Eq. 7), and ``distances``,
+            shape (n_sequences,). tau is non-decreasing, ``tau(0) = 0``, ``tau(P-1) = P-1``.
         """
         raise NotImplementedError(
             f"{type(self).__name__} does not define match(self, X), which returns a Match."
@@ -454,9 +452,8 @@ class AnchoredSynchronizer(Synchronizer):
         ValueError
             If the input breaks the contract, or the pattern does not exist or fit. If key-frames
             are not increasing, inside their trial and equally many in all; if they look like
-            seconds, all below 1 or in the first fiftieth of a trial and not whole; if no
-            trial has one of them; or if trials have events whose frames are not their
-            rows.
+            seconds, all below 1 or in the first fiftieth of a trial and not whole; if no trial has
+            one of them; or if trials have events whose frames are not their rows.
         """
         self._fit(X, keyframes, frame_rate, confidence)
         return self
@@ -556,8 +553,7 @@ class AnchoredSynchronizer(Synchronizer):
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Trials; the rows of a 2-D array are univariate ones.
-            Read in parts as by ``transform``.
+            Trials; the rows of a 2-D array are univariate ones. Read in parts as by ``transform``.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
             Key-frames of each trial, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None

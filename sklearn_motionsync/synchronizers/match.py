@@ -183,13 +183,12 @@ class Match:
     ) -> tuple[np.ndarray, np.ndarray]:
         """How sure ``times`` are: where a trial shows the moments of the pattern.
 
-        For a key moment of the pattern, the interval holds the time of the same moment of a
-        trial with this probability. It is pointwise: of many moments a share of
-        ``1 - coverage`` is outside. Its width follows from the paths of the trellis that cost
-        hardly more than the best one, and from the share of the movement that no warp explains.
-        Constants turn them into per cent. They were fitted to key moments of people, or
-        ``DenseSynchronizer.calibrate`` fits them to yours. Of warps that are refined the width
-        follows from the noise.
+        For a key moment of the pattern, the interval holds the time of the same moment of a trial
+        with this probability. It is pointwise: of many moments a share of ``1 - coverage`` is
+        outside. Its width follows from the paths of the trellis that cost hardly more than the best
+        one, and from the share of the movement that no warp explains. Constants turn them into per
+        cent. They were fitted to key moments of people, or ``DenseSynchronizer.calibrate`` fits
+        them to yours. Of warps that are refined the width follows from the noise.
 
         Parameters
         ----------
@@ -324,10 +323,9 @@ class Match:
         Returns
         -------
         DataFrame
-            Indexed by the label of the trial and the frame of the pattern. Columns:
-            ``time``, tau(p) in the unit, from the beginning of each trial; ``offset``;
-            ``rate``; and with a coverage ``lower`` and ``upper``, between which the time lies, and
-            ``doubtful``.
+            Indexed by the label of the trial and the frame of the pattern. Columns: ``time``,
+            tau(p) in the unit, from the beginning of each trial; ``offset``; ``rate``; and with a
+            coverage ``lower`` and ``upper``, between which the time lies, and ``doubtful``.
 
         Raises
         ------
@@ -421,8 +419,7 @@ class Match:
         Raises
         ------
         ValueError
-            If there is not one sequence a trial, or they break the contract for
-            trials.
+            If there is not one sequence a trial, or they break the contract for trials.
         """
         arrays, _ = read_collection(X)
         self._check_count(arrays, "sequence")

@@ -77,9 +77,8 @@ class PartSynchronizer(AnchoredSynchronizer):
 
            lambda (d - d_body)^2
 
-       where d_body is the body's offset between the same two trials, and lambda is
-       ``coupling`` times the mean squared norm of the part's features, with d in per cent of the
-       clock.
+       where d_body is the body's offset between the same two trials, and lambda is ``coupling``
+       times the mean squared norm of the part's features, with d in per cent of the clock.
     3. ``transform`` samples every part at its own times. Features that belong to no part follow the
        body.
 
@@ -133,8 +132,7 @@ class PartSynchronizer(AnchoredSynchronizer):
 
     A part that hardly moves, such as the idle arm of a grab, carries no information about timing:
     without coupling its warp and its lag are random. `Lags.summary` shows this as a large spread.
-    The coupling reduces the mean distance of a part from the body; a single trial may still
-    jump.
+    The coupling reduces the mean distance of a part from the body; a single trial may still jump.
 
     References
     ----------
@@ -458,9 +456,8 @@ _CONFIDENCE = 0.95
 class Lags(NamedTuple):
     """How much later than the rest of the body each part is, at every frame of the pattern.
 
-    `PartSynchronizer.lags` returns them. Lags are counted from the mean of the training
-    trials. Their spread shows whether a lag is a habit of subjects or varies from trial
-    to trial.
+    `PartSynchronizer.lags` returns them. Lags are counted from the mean of the training trials.
+    Their spread shows whether a lag is a habit of subjects or varies from trial to trial.
 
     Parameters
     ----------

@@ -42,17 +42,15 @@ class TimingChannel(
     """Synchronised trials, with their timing as an additional feature.
 
     Synchronisation removes differences in timing from the curves. Here they are appended to the
-    curves, as how much later than the pattern a trial is (`Match.offsets_in`). So later
-    steps, such as principal components, a test along the clock, or a classifier, use both shape and
-    timing.
+    curves, as how much later than the pattern a trial is (`Match.offsets_in`). So later steps, such
+    as principal components, a test along the clock, or a classifier, use both shape and timing.
 
     Parameters
     ----------
     synchronizer : Synchronizer
         Such as ``DenseSynchronizer()``; a clone of it is fitted.
     unit : {"percent", "frames", "seconds"}, default="percent"
-        Unit of the offset: per cent of the clock, frames of the pattern, or seconds of each
-        trial.
+        Unit of the offset: per cent of the clock, frames of the pattern, or seconds of each trial.
     frame_rate : float, default=None
         Frames per second of the trials, for seconds only.
     errors : bool, default=False
