@@ -53,7 +53,7 @@ def test_title_names_the_pattern(bunch, pipe):
     assert f"trial {pipe[2].pattern_index_}" in display.axes_[1].get_title()
     assert display.group_means_ == [[], [], []]
     others = [x for i, x in enumerate(bunch.data) if i != pipe[2].pattern_index_]
-    title = SynchronizationDisplay.from_estimator(pipe, others).axes_[1].get_title()
+    title = SynchronizationDisplay.from_estimator(pipe, others, features=0).axes_[1].get_title()
     assert "pattern" in title
     assert "trial" not in title
 
@@ -227,18 +227,20 @@ def check_bands(display, match, coverage, *args):
 
 def test_bands_are_the_intervals_of_the_match(bunch, pipe):
     match = Match.from_estimator(pipe, bunch.data)
-    for coverage in (0.9, 0.5, np.float32(0.75)):
-        display = SynchronizationDisplay.from_estimator(pipe, bunch.data, coverage=coverage)
+    for coverage in (0.5, np.float32(0.75)):
+        display = SynchronizationDisplay.from_estimator(
+            pipe, bunch.data, features=0, coverage=coverage
+        )
         check_bands(display, match, coverage)
         title = display.axes_[-1].get_title()
         assert title.endswith(f"shaded: {100 * coverage:g} % intervals")
         assert display.intervals_.get_zorder() < display.offsets_.get_zorder()
-    check_bands(SynchronizationDisplay.from_estimator(pipe, bunch.data), match, 0.9)
+    check_bands(SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0), match, 0.9)
 
 
 def test_bands_have_the_unit_of_the_offsets(bunch, pipe):
     match, seconds = Match.from_estimator(pipe, bunch.data), {"unit": "seconds", "frame_rate": 50}
-    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, unit="percent")
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0, unit="percent")
     check_bands(display, match, 0.9, "percent")
     display = SynchronizationDisplay.from_estimator(pipe, bunch.data, **seconds)
     check_bands(display, match, 0.9, "seconds", bunch.data, 50)
@@ -257,7 +259,7 @@ def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
         colors = display.offsets_.get_colors()
         np.testing.assert_array_equal(display.intervals_.get_facecolor()[:, :3], colors[:, :3])
         display.figure_.canvas.draw()
-    display = SynchronizationDisplay.from_estimator(pipe, X, warps=False)
+    display = SynchronizationDisplay.from_estimator(pipe, X, features=0, warps=False)
     assert display.intervals_ is None
     assert display.axes_[0].get_title() == "as recorded\n9 trials, dotted: 1 doubtful trial"
     assert is_dotted(display.before_[0]) == doubtful.tolist()
@@ -283,18 +285,18 @@ def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
 def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch, pipe):
     points = pipe[:2].transform([*bunch.data[:8], twice(bunch.data[8])])
     match = pipe[2].match(points)
-    one = SynchronizationDisplay.from_predictions(points, match)
-    other = SynchronizationDisplay.from_estimator(pipe[2], points)
+    one = SynchronizationDisplay.from_predictions(points, match, features=0)
+    other = SynchronizationDisplay.from_estimator(pipe[2], points, features=0)
     for found, expected in zip(segments(one.intervals_), segments(other.intervals_), strict=True):
         np.testing.assert_array_equal(found, expected)
     assert is_dotted(one.offsets_) == is_dotted(other.offsets_) == match.doubtful.tolist()
     title = "offsets\nshaded: {} % intervals; dotted: 1 doubtful trial"
     assert one.axes_[-1].get_title() == other.axes_[-1].get_title() == title.format(90)
-    half = SynchronizationDisplay.from_predictions(points, match, coverage=0.5)
+    half = SynchronizationDisplay.from_predictions(points, match, features=0, coverage=0.5)
     assert half.axes_[-1].get_title() == title.format(50)
     for plain in (
-        SynchronizationDisplay.from_predictions(points, match, coverage=None),
-        SynchronizationDisplay.from_predictions(points, match.times),
+        SynchronizationDisplay.from_predictions(points, match, features=0, coverage=None),
+        SynchronizationDisplay.from_predictions(points, match.times, features=0),
     ):
         assert plain.axes_[-1].get_title() == title.partition("\n")[0]
         assert plain.intervals_ is None
