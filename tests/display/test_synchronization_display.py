@@ -251,7 +251,7 @@ def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
     doubtful = Match.from_estimator(pipe, X).doubtful
     assert doubtful.tolist() == [i == 4 for i in range(9)]
     for groups in (None, GROUPS):
-        display = SynchronizationDisplay.from_estimator(pipe, X, features=[0, 1], y=groups)
+        display = SynchronizationDisplay.from_estimator(pipe, X, features=[0], y=groups)
         for lines in (*display.before_, *display.after_, display.offsets_):
             assert is_dotted(lines) == doubtful.tolist()
         assert display.axes_[-1].get_title().endswith("; dotted: 1 doubtful trial")
