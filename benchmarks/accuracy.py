@@ -25,12 +25,14 @@ from harness import (
     figures,
     geometric_means,
     known_warps,
+    on_time_line,
     percent,
     print_head,
     print_row,
     print_versions,
     ratio,
     read_people,
+    read_unseen,
     run_tables,
     show_pair,
 )
@@ -149,22 +151,41 @@ def harm(before, after):
     return ", ".join(name for name, is_larger in larger.items() if is_larger)
 
 
+def unseen_table(folder):
+    """46 moments of 23 actions on which nothing was chosen, on one time line."""
+    sets = read_unseen(folder / "events44" / "events44.npz")
+    print_head("46 moments nothing was chosen on", [TIME_LINE, "spread there"])
+    for name in (LINEAR, PAPER, DEFAULTS):
+        print_row(name, of_unseen(sets, partial(ours_to, OURS[name], n="median")))
+
+
+def of_unseen(sets, times_of):
+    """Cells of a table: errors and spread of the moments of sets, given what finds their warps."""
+    errors = {}
+    for action, trials, moments in sets:
+        times = times_of(trials)
+        errors |= {(action, event): on_time_line(times, at) for event, at in moments.items()}
+    return on_line(errors)
+
+
 # -- other packages ---------------------------------------------------------------------
 
 
 def peer_table(folder):
     """Every setting of the installed packages that put a set on one time line."""
-    people = read_people(folder)
-    print_head("other packages", [TIME_LINE, "spread there"])
+    people, sets = read_people(folder), read_unseen(folder / "events44" / "events44.npz")
+    columns = [TIME_LINE, "spread there", "46 moments nothing was chosen on", "spread there"]
+    print_head("other packages", columns)
     for label in peers.TIME_LINES:
         if peers.installed(label) is None:
             print(f"{label} is not installed", file=sys.stderr)
             continue
         for text, kind, align in peers.settings(label):
+            times_of = partial(fed, align, kind)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                lines = [one.to_time_line(partial(fed, align, kind)) for one in people]
-            print_row(f"{label}, {text}", on_line(merged(lines)))
+                lines = merged([one.to_time_line(times_of) for one in people])
+                print_row(f"{label}, {text}", [*on_line(lines), *of_unseen(sets, times_of)])
 
 
 def fed(align, kind, X):
@@ -204,7 +225,12 @@ def bending_table(folder):
         print_row(name, [f"{mean:.3f}" for mean in np.mean(pairs, axis=0)])
 
 
-TABLES = {"people": people_table, "known-warps": known_table, "bends": bending_table}
+TABLES = {
+    "people": people_table,
+    "unseen": unseen_table,
+    "known-warps": known_table,
+    "bends": bending_table,
+}
 
 
 def prepare(options):

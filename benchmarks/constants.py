@@ -48,6 +48,7 @@ from harness import (
     print_head,
     print_row,
     read_people,
+    read_unseen,
 )
 from joblib import Parallel, delayed
 from sklearn_motionsync import DenseSynchronizer
@@ -236,24 +237,6 @@ def on_one_clock(sets):
         for event, at in moments.items():
             errors[name, event] = on_time_line(times, at)[0].mean()
     return errors
-
-
-def read_unseen(path):
-    """(action, trials, {event: times}) of every action of events44."""
-    with np.load(path) as file:
-        archive = dict(file)
-    shapes = np.repeat(archive["n_features"], archive["n_trials"])
-    sizes = archive["n_frames"] * shapes
-    flat = np.split(archive["values"], np.cumsum(sizes)[:-1])
-    trials = [x.reshape(-1, width) for x, width in zip(flat, shapes, strict=True)]
-    ends, place, sets = np.cumsum(archive["n_trials"]), 0, []
-    for number, (action, end) in enumerate(zip(archive["action"], ends, strict=True)):
-        count, moments = archive["n_trials"][number], {}
-        for event in archive["event"][archive["event_action"] == number]:
-            moments[str(event)] = archive["times"][place : place + count]
-            place += count
-        sets.append((str(action), trials[end - count : end], moments))
-    return sets
 
 
 def read_landmarks(folder):

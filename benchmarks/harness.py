@@ -378,6 +378,24 @@ def read_people(folder, events=EVENTS, patterns=PATTERNS):
     return [People(action, patterns) for action in read_actions(folder, events)]
 
 
+def read_unseen(path):
+    """(action, trials, {event: times}) of every action of events44."""
+    with np.load(path) as file:
+        archive = dict(file)
+    shapes = np.repeat(archive["n_features"], archive["n_trials"])
+    sizes = archive["n_frames"] * shapes
+    flat = np.split(archive["values"], np.cumsum(sizes)[:-1])
+    trials = [x.reshape(-1, width) for x, width in zip(flat, shapes, strict=True)]
+    ends, place, sets = np.cumsum(archive["n_trials"]), 0, []
+    for number, (action, end) in enumerate(zip(archive["action"], ends, strict=True)):
+        count, moments = archive["n_trials"][number], {}
+        for event in archive["event"][archive["event_action"] == number]:
+            moments[str(event)] = archive["times"][place : place + count]
+            place += count
+        sets.append((str(action), trials[end - count : end], moments))
+    return sets
+
+
 def fewer_clips(folder, events, n_clips):
     """One action with only some of its clips, taken evenly from their list."""
     (action,) = read_actions(folder, events)

@@ -45,9 +45,9 @@ __all__ = ["DenseSynchronizer"]
 class DenseSynchronizer(AnchoredSynchronizer):
     """Align trials in time: warp all of them to the most typical one.
 
-    That trial is the pattern, here the *pattern*. Every trial is matched to it by all of its
-    signals at once. A warp then brings the same moments together. The time shifts are a result,
-    too.
+    That trial is the *pattern*; others call it a template. Every other trial is matched to it by
+    all of its signals at once. A warp then brings the same moments together. The time shifts are a
+    result, too.
 
     One signal peaks at frame 40, 50 or 62 of three trials:
 

@@ -161,7 +161,7 @@ def test_a_bump_in_one_of_four_signals_is_not_called_timing():
     assert "timing" in set(alone.clusters["what"])
     # Where shapes are not looked at, neither is found, and the answer says so.
     hip = compare_groups(pipe, trials, **given, features=0)
-    assert "A and B, 20 units: they differ, in shape or in timing (joint" in hip.describe()
+    assert "A and B, 20 people: they differ, in shape or in timing (joint" in hip.describe()
     assert len(hip.clusters) == 0
 
 
