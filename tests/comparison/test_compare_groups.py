@@ -378,7 +378,7 @@ GROUPS = ["a", "b"] * 8
         ),
         (
             {"y": GROUPS[:15] + ["a"], "groups": PAIRS, "paired": True},
-            "'p7' has no trial in group 'b'",
+            "'p7' has no trial of 'b' in y",
         ),
         (
             {"y": range(16), "covariate": True, "paired": True},
@@ -398,7 +398,7 @@ GROUPS = ["a", "b"] * 8
         ),
         ({"y": GROUPS, "unit": "hours"}, "unit must be one of"),
         ({"y": GROUPS, "unit": "seconds"}, "needs X and frame_rate"),
-        ({"y": GROUPS, "signals": [np.ones((5, 1))] * 3}, "one sequence for each of 16 perf"),
+        ({"y": GROUPS, "signals": [np.ones((5, 1))] * 3}, "one sequence for each of 16 trials"),
         ({"y": GROUPS, "signals": [np.full((5, 1), np.nan)] * 16}, "Trial 0, frame"),
         ({"y": GROUPS, "features": "knee"}, "knee"),
     ],

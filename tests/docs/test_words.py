@@ -1,4 +1,4 @@
-"""Pages without the private terms of this project."""
+"""One list of words for pages and code, and pages without private terms."""
 
 import re
 from pathlib import Path
@@ -18,10 +18,9 @@ PAGES = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path 
 # Words that only this project knows, and what to write instead. Code does not count, nor do
 # *italics*, in which a page may name the word that the code has for a thing.
 INSTEAD = {
-    r"trials?": "trial",
-    r"poses?": "pose",
-    r"patterns?": "pattern",
-    r"clocks?": "time axis, frames of the pattern",
+    r"performances?": "trial",
+    r"postures?": "pose",
+    r"templates?": "pattern",
     r"yardsticks?|rulers?": "measure",
     r"journeys?": "from your files to a figure",
     r"strangers?": "new people",
@@ -54,31 +53,90 @@ IN_PROSE = [
 ]
 
 
+def with_lines(match, instead):
+    return "\n" * (match[0].count("\n") - instead.count("\n")) + instead
+
+
 def prose_of(text):
-    """A page without what is no prose."""
+    """A page without what is no prose. Every line keeps its number."""
     for outside in NO_PROSE:
-        text = re.sub(outside, "", text, flags=re.DOTALL | re.MULTILINE)
+        lines = re.compile(outside, re.DOTALL | re.MULTILINE)
+        text = lines.sub(lambda m: with_lines(m, ""), text)
     for inside, instead in IN_PROSE:
-        text = re.sub(inside, instead, text)
+        text = re.sub(inside, lambda m, s=instead: with_lines(m, m.expand(s)), text)
     return text
 
 
 def private_words(text):
-    """Each word with what stands before it, and what to write instead."""
+    """Line, word, and what to write instead."""
     prose = prose_of(text)
     return [
-        (prose[max(0, match.start() - 40) : match.end()], instead)
+        (1 + prose.count("\n", 0, match.start()), match[0], instead)
         for word, instead in INSTEAD.items()
         for match in re.finditer(rf"\b({word})\b".replace(" ", r"\s+"), prose, re.IGNORECASE)
     ]
 
 
+# -- the pages --------------------------------------------------------------------------
+
+
 @pytest.mark.parametrize("name", PAGES)
 def test_page_has_no_private_words(name):
-    messages = [f'"{words}", write: {new}' for words, new in private_words(PAGES[name])]
+    messages = [
+        f'{name}:{line}: "{word}", write: {new}' for line, word, new in private_words(PAGES[name])
+    ]
     assert messages == [], "\n".join(messages)
 
 
-def test_private_words_are_found_in_prose_only():
-    page = "# Clocks\n\nIt says\nso. A *clock* is a `pattern`, see [poses](strangers.md).\n"
-    assert [new for _, new in private_words(page)] == ["pose", "name what is said"]
+# -- the code ---------------------------------------------------------------------------
+
+# What is called so elsewhere: a journal, names of Python, scikit-learn and CSS, and the old names
+# of the package, which are refused with the new ones.
+ELSEWHERE = (
+    r"Gait & Posture|Posture\* 30|string import Template|Template\(|_doc_link_template"
+    r"|others call it a template|grid-?[tT]emplate-?[cC]olumns|(blend|find|load)_performances"
+)
+
+
+@pytest.mark.parametrize("suffix", ["py", "js", "css", "html"])
+def test_code_has_the_words_of_the_pages(suffix):
+    words = re.compile("performance|posture|template", re.IGNORECASE)
+    messages = [
+        f"{path.relative_to(ROOT)}:{i}: {line.strip()}"
+        for path in sorted((ROOT / "sklearn_motionsync").rglob(f"*.{suffix}"))
+        for i, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if words.search(re.sub(ELSEWHERE, "", line))
+    ]
+    assert messages == [], "\n".join(messages)
+
+
+# -- the check finds what is wrong ----------------------------------------------------------
+
+BAD = """(target-of-templates)=
+# Performances on one clock
+
+The median says
+so. A *performance* is a `template`, see [the postures of strangers](templates.md).
+
+```python
+posture = 1
+```
+
+| templates | journeys |
+|---|---|
+
+(house)=
+- Everybody is in
+  step; {doc}`journeys` is a page, $template$ a formula.
+"""
+
+
+def test_private_words_are_found_on_their_lines():
+    places = [(line, word) for line, word, _ in private_words(BAD)]
+    assert sorted(places) == [
+        (4, "says\nso"),
+        (5, "postures"),
+        (5, "strangers"),
+        (15, "Everybody"),
+        (15, "in\n  step"),
+    ]

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pytest
+from IPython.core.formatters import HTMLFormatter
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
@@ -767,8 +768,9 @@ def test_labels_stay_with_slices_and_choices():
         for x, i in zip(some, expected, strict=True):
             pd.testing.assert_frame_equal(x, trials[i])
     assert trials[-1] is trials[3]
-    assert "n_frames" in trials._repr_html_()
-    assert "<td>bob</td>" in trials._repr_html_()
+    shown = HTMLFormatter()(trials)
+    assert "n_frames" in shown
+    assert "<td>bob</td>" in shown
 
 
 def test_trials_of_one_level_or_of_none_have_labels():
