@@ -129,9 +129,17 @@ import numpy as np
 import pandas as pd
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import *
+from sklearn_motionsync.body import *
+from sklearn_motionsync.comparison import *
 from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.gait import *
 from sklearn_motionsync.io import keyframes_from_events, read_motion
+from sklearn_motionsync.live import *
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, group_timing_error, least_squares
+from sklearn_motionsync.model import *
+from sklearn_motionsync.recognition import *
+from sklearn_motionsync.synchronizers import *
+from sklearn_motionsync.takes import *
 X = list(np.random.RandomState(0).standard_normal((3, 20, 2)).cumsum(axis=1))
 tables = [pd.DataFrame(x) for x in X]
 sync = LinearSynchronizer().fit(X)

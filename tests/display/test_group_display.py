@@ -192,7 +192,7 @@ def test_signals_are_what_reaches_an_aspace():
         ({"unit": "seconds"}, "frame_rate"),
         ({"signals": TRIALS[:3]}, "one sequence for each of 28 trials, got 3"),
         ({"events": np.ones((3, 1))}, "events must be a list of 28 arrays"),
-        ({"y": ["A"]}, "groups must have one label"),
+        ({"y": ["A"]}, "y must have one label"),
     ],
 )
 def test_refused_arguments(pipe, given, message):

@@ -56,7 +56,7 @@ def test_lines_on_the_clock_and_ticks_of_trials(sync, unit, scale):
 
 
 def test_ticks_have_the_colours_of_groups(sync):
-    given = {"features": 0, "groups": GAIT.group, "warps": False}
+    given = {"features": 0, "y": GAIT.group, "warps": False}
     display = SynchronizationDisplay.from_estimator(sync, X, keyframes=K, **given)
     curves = display.before_[0].get_colors()[:, :3]
     (ticks,) = display.own_keyframes_

@@ -8,6 +8,7 @@ from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.io import read_motion
 
 from motion_files import body, joint, put
+from plain_readers import plain_bvh
 
 
 def test_position_channels_replace_offset_and_the_first_rotation_is_the_outermost(tmp_path):
@@ -102,7 +103,7 @@ def test_random_trees_agree_with_plain_matrices(tmp_path, benchmark, seed):
     text = "\n".join(["HIERARCHY", *roots, "MOTION", "Frames: 4", "Frame Time: 1", *rows])
     path = put(tmp_path, text)
     assert n_channels > 20
-    expected = benchmark("readers").plain_bvh(path)
+    expected = plain_bvh(path)
     np.testing.assert_allclose(read_motion(path), expected.reshape(4, -1), atol=1e-9)
 
 

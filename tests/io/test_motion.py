@@ -13,6 +13,7 @@ from sklearn_motionsync.io.motion import READERS
 import fuzz_readers
 from fuzz_readers import DAMAGES
 from motion_files import AMC, EXAMPLES, body, c3d, put, texts
+from plain_readers import PLAIN
 
 ROOT = Path(__file__).resolve().parents[2]
 MANUAL = (ROOT / "docs" / "howto" / "motion_files.md").read_text(encoding="utf-8")
@@ -165,7 +166,7 @@ def test_recordings_have_the_names_of_their_files_in_tables(tmp_path):
 )
 def test_real_files_agree_with_plain_parsers(real_data, benchmark, name):
     path = real_data / "original_files" / name
-    expected = benchmark("readers").PLAIN[path.suffix](path)
+    expected = PLAIN[path.suffix](path)
     scale = 1e-12 * np.abs(expected).max()
     df = read_motion(path)
     np.testing.assert_allclose(df.to_numpy().reshape(expected.shape), expected, atol=scale, rtol=0)

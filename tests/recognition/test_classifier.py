@@ -390,12 +390,8 @@ def test_a_class_of_one_group_is_held_out(known, new):
     assert classifier.score(new[0], new[1]) == 1
     # The class is unknown when that group is held out; the others are not.
     assert np.isfinite(classifier.held_out_).all()
-    # Two groups of one class each: without either there is one class.
-    two = y != "rise"
-    X = [X[i] for i in np.flatnonzero(two)]
-    classifier = ActionClassifier(n_frames=20).fit(X, y[two], groups=y[two])
-    assert np.isnan(classifier.held_out_).all()
-    assert classifier.temperature_ == pytest.approx(4)
+    with pytest.raises(ValueError, match="the same 3 sets of trials apart as y"):
+        ActionClassifier(n_frames=20).fit(X, y, groups=[f"of {label}" for label in y])
 
 
 def test_identical_trials_have_equal_probabilities(known):

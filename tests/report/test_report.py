@@ -167,7 +167,7 @@ def test_a_covariate_takes_the_place_of_groups(tmp_path):
         )
     )
     assert "Covariate" in page.headings
-    assert "Regression, 8 units" in page.text
+    assert "Regression, 8 people" in page.text
     assert page.table("trials")["covariate"].tolist() == age
 
 

@@ -126,7 +126,7 @@ OF_OTHERS |= {"MotionTracker.fit(y)"}
 def methods_with_labels():
     """Public methods and functions that take labels of trials, as METHODS names them."""
     for name, each in functions():
-        if not inspect.isclass(each):
+        if inspect.isfunction(each) or inspect.ismethod(each):
             parameters = inspect.signature(each).parameters
             if "groups" in parameters:
                 yield from (f"{name}({p})" for p in ("y", "groups") if p in parameters)
