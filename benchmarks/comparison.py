@@ -37,11 +37,11 @@ import warnings
 from functools import partial
 
 import numpy as np
-from harness import command_line, percent, print_head, print_row, run_tables
+from harness import at_frames, command_line, percent, print_head, print_row, run_tables
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import DenseSynchronizer, FrameWise
+from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer
 from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.datasets import make_gait
 
@@ -154,7 +154,7 @@ def made(seed, n_people, difference):
             t = np.linspace(0, 1, len(x))
             x = x + bump(t, height, centre)[:, np.newaxis] * (np.arange(x.shape[1]) == KNEE)
             moments = t - later(t, warp, centre)  # what is shown at t was before shown then
-            x = np.stack([np.interp(moments, t, column) for column in x.T], axis=1)
+            x = at_frames(x, (len(x) - 1) * moments)
         trials.append(x)
     truth = {"shape": None, "timing": None}
     if height:
@@ -166,10 +166,7 @@ def made(seed, n_people, difference):
 
 def means_of_people(trials, groups, people):
     """Means of linearly normalised trials, group A first: (n_people, P, n_signals), and n of A."""
-    curves = np.stack([
-        np.stack([np.interp(CLOCK, np.linspace(0, 1, len(x)), column) for column in x.T], axis=1)
-        for x in trials
-    ])  # fmt: skip
+    curves = LinearSynchronizer(P).fit_transform(trials)
     of = dict(zip(people, groups, strict=True))
     names = sorted(of, key=lambda name: of[name])
     means = [curves[[person == name for person in people]].mean(axis=0) for name in names]

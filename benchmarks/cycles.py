@@ -26,7 +26,7 @@ import functools
 from pathlib import Path
 
 import numpy as np
-from harness import command_line, print_head, print_row, run_tables
+from harness import at_frames, command_line, print_head, print_row, run_tables, vertex
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn_motionsync.datasets import load_trials
@@ -87,8 +87,7 @@ def foot_strikes(positions, skeleton, frame_rate):
         ahead = gaussian_filter1d(ahead, SMOOTHING * frame_rate, mode="nearest")
         apart = max(1, int(APART * frame_rate))
         k, _ = find_peaks(ahead, prominence=0.3 * np.ptp(ahead), distance=apart)
-        before, here, after = ahead[k - 1], ahead[k], ahead[k + 1]
-        strikes.append(k + (before - after) / (2 * (before - 2 * here + after)))
+        strikes.append(np.array([vertex(ahead, frame) for frame in k]))
     return strikes
 
 
@@ -97,11 +96,16 @@ def period_of_strikes(x, skeleton, frame_rate):
     return 2 * np.median(np.diff(np.sort(np.concatenate(foot_strikes(x, skeleton, frame_rate)))))
 
 
-def chains(folder, every):
-    """Repetitions of a person and an exercise, one after the other, and where each begins."""
+def read_exercises(folder):
+    """The archive of UI-PRMD, and its trials about the mean of the markers."""
     file = np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz")
     positions = file["positions"] - file["positions"].mean(axis=1, keepdims=True)
-    parts = np.split(positions.reshape(len(positions), -1), file["offsets"][1:-1])
+    return file, np.split(positions.reshape(len(positions), -1), file["offsets"][1:-1])
+
+
+def chains(folder, every):
+    """Repetitions of a person and an exercise, one after the other, and where each begins."""
+    file, parts = read_exercises(folder)
     rng = np.random.default_rng(0)
     for label in np.unique(file["label"]):
         for actor in np.unique(file["actor"]):
@@ -152,15 +156,20 @@ def warnings_of(folder):
 # -- standing, and other actions --------------------------------------------------------
 
 
-def turned(pose, other, skeleton):
+def turned(points, angles):
+    """Points (n_frames, n, 3) turned about the vertical."""
+    c, s = np.cos(angles)[:, np.newaxis], np.sin(angles)[:, np.newaxis]
+    x, y, z = np.moveaxis(points, 2, 0)
+    return np.stack([c * x + s * z, y, c * z - s * x], axis=2)
+
+
+def placed_on(pose, other, skeleton):
     """A pose, turned and shifted so that its pelvis and hips are those of another."""
     hips = [skeleton.index_of(f"{side}_hip") for side in ("left", "right")]
     pelvis = skeleton.index_of("pelvis")
     across = [x[hips[0]] - x[hips[1]] for x in (pose, other)]
     angle = np.subtract(*(np.arctan2(x[2], x[0]) for x in across[::-1]))
-    cos, sin = np.cos(angle), np.sin(angle)
-    turn = np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
-    return (pose - pose[pelvis]) @ turn.T + other[pelvis]
+    return turned(pose[np.newaxis] - pose[pelvis], -angle[np.newaxis])[0] + other[pelvis]
 
 
 def blended(start, end, n):
@@ -177,7 +186,7 @@ def with_standing(walk, factor, kind, rng):
     for end in (points[0], points[-1]):
         stands = np.repeat(end[np.newaxis], count, axis=0)
         if kind != "freeze":
-            pose = turned(walk["pose"], end, walk["skeleton"])
+            pose = placed_on(walk["pose"], end, walk["skeleton"])
             turn = blended(end, pose, max(round(TURN * rate), 1))
             stands = np.concatenate([turn, np.repeat(pose[np.newaxis], count, axis=0)])[:count]
         sides.append(stands)
@@ -221,12 +230,6 @@ def walks(folder):
             }
 
 
-def resampled(take, step):
-    """A take at every so many frames, by straight lines."""
-    at = np.arange(0, len(take) - 1, step)
-    return np.stack([np.interp(at, np.arange(len(take)), x) for x in take.T], axis=1)
-
-
 def standing(every, factor, kind, rate=None, seed=0):
     """Counts of walks: cyclic, right periods; of cycles, inside; of cuts, inside; of stretches."""
     rng, counts = np.random.default_rng(seed), np.zeros(7, dtype=int)
@@ -236,7 +239,8 @@ def standing(every, factor, kind, rate=None, seed=0):
         for walk in own:
             take, place = with_standing(walk, factor, kind, rng)
             step = 1 if rate is None else walk["rate"] / rate
-            takes.append(take if rate is None else resampled(take, step))
+            frames = np.arange(0, len(take) - 1, step)
+            takes.append(take if rate is None else at_frames(take, frames))
             ends.append(np.array(place) / step)
             periods.append(walk["period"] / step)
         skeleton = own[0]["skeleton"]
@@ -266,7 +270,8 @@ def joined(clips, skeleton, rate=120, turn=0.4):
         points = np.asarray(x, dtype=float).reshape(len(x), -1, 3)
         if parts:
             last = parts[-1][-1]
-            parts.append(blended(last, turned(points[0], last, skeleton), round(turn * rate))[:-1])
+            pose = placed_on(points[0], last, skeleton)
+            parts.append(blended(last, pose, round(turn * rate))[:-1])
             n += len(parts[-1])
         parts.append(points)
         places.append((n, n + len(points)))
@@ -327,14 +332,6 @@ def gestures(folder):
     yield "elsewhere in takes", sum(map(len, stretches)) - len(right) + others
 
 
-def exercises(folder):
-    """Exercises that are done once: how many, and how many are called cyclic."""
-    file = np.load(f"{folder}/uiprmd/uiprmd_odd_positions.npz")
-    positions = file["positions"] - file["positions"].mean(axis=1, keepdims=True)
-    takes = np.split(positions.reshape(len(positions), -1), file["offsets"][1:-1])
-    return len(takes), int(CycleSegmenter().report(takes)["cyclic"].sum())
-
-
 # -- tables -----------------------------------------------------------------------------
 
 
@@ -357,8 +354,8 @@ def single_table(folder):
             report = CycleSegmenter(bunch.skeleton).report(bunch.data)
             counts = [len(report), report["cyclic"].sum()]
             print_row(label, [*map(str, counts), f"{report['strength'].max():.2f}"])
-    n_takes, called = exercises(folder)
-    print_row("exercises", [str(n_takes), str(called), ""])
+    report = CycleSegmenter().report(read_exercises(folder)[1])
+    print_row("exercises", [str(len(report)), str(report["cyclic"].sum()), ""])
 
 
 def several_table(folder):

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from exercises import read_positions
-from harness import command_line, percent, print_head, print_row, run_tables
+from harness import at_frames, command_line, percent, print_head, print_row, run_tables
 from scipy.spatial.transform import Rotation
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -114,12 +114,9 @@ def put_fault(x, name, rng):
 def _late(x, limb, share):
     """All below the upper joint of a limb as it was before a share of the time."""
     moved, upper, below = x.copy(), *_joints(limb)
-    frames = np.arange(len(x))
-    before = np.clip(frames - share * (len(x) - 1), 0, None)
+    before = np.clip(np.arange(len(x)) - share * (len(x) - 1), 0, None)
     for joint in below:
-        relative = x[:, joint] - x[:, upper]
-        for k in range(3):
-            moved[:, joint, k] = x[:, upper, k] + np.interp(before, frames, relative[:, k])
+        moved[:, joint] = x[:, upper] + at_frames(x[:, joint] - x[:, upper], before)
     return moved
 
 

@@ -21,7 +21,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from harness import print_head, print_row
+from harness import on_time_line, print_head, print_row, vertex
 from scipy.interpolate import CubicSpline
 from sklearn_motionsync import DenseSynchronizer
 
@@ -39,15 +39,7 @@ def events(curve):
     first = 5 + np.argmax(curve[5:45])
     second = 55 + np.argmax(curve[55:96])
     valley = first + np.argmin(curve[first : second + 1])
-    return np.array([_vertex(curve, frame) for frame in (first, valley, second)])
-
-
-def _vertex(curve, frame):
-    if not 0 < frame < len(curve) - 1:
-        return float(frame)
-    before, here, after = curve[frame - 1 : frame + 2]
-    bend = before - 2 * here + after
-    return frame + ((before - after) / (2 * bend) if bend else 0)
+    return np.array([vertex(curve, frame) for frame in (first, valley, second)])
 
 
 def read_children():
@@ -64,22 +56,13 @@ def events_of_child(angles):
     hip, knee = angles.T
     first, swing = np.argmax(knee[:28]), 55 + np.argmax(knee[55:96])
     stance = first + np.argmin(knee[first : swing + 1])
-    found = [_vertex(knee, frame) for frame in (first, stance, swing)]
-    return np.array([*found, _vertex(hip, 30 + np.argmin(hip[30:75]))])
+    found = [vertex(knee, frame) for frame in (first, stance, swing)]
+    return np.array([*found, vertex(hip, 30 + np.argmin(hip[30:75]))])
 
 
-def spreads(curves, times):
-    """Standard deviations of the events of forces on the common clock, in per cent: (3,)."""
-    return spreads_of([events(y) for y in curves], times)
-
-
-def spreads_of(moments, times):
+def spreads(moments, times):
     """Standard deviations of moments of trials on the common clock, in per cent."""
-    clock = np.arange(times.shape[1])
-    # Where tau stands still any frame of the clock would do; the tilt chooses one.
-    tilted = times + 1e-9 * clock
-    placed = [np.interp(at, tau, clock) for at, tau in zip(moments, tilted, strict=True)]
-    return np.std(placed, axis=0, ddof=1) * 100 / (len(clock) - 1)
+    return [on_time_line(times, at)[1] * 100 / (times.shape[1] - 1) for at in np.transpose(moments)]
 
 
 def linear(curves):
@@ -135,7 +118,7 @@ def children_table():
         cells, rates = [], []
         for joints, at in ((slice(1, 2), slice(3)), (slice(1), slice(3, 4)), (slice(2), slice(4))):
             found = times(children[:, :, joints])
-            cells.append(", ".join(f"{x:.2f}" for x in spreads_of(moments[:, at], found)))
+            cells.append(", ".join(f"{x:.2f}" for x in spreads(moments[:, at], found)))
             rates.append(np.diff(found, axis=1))
         cells += [f"{np.mean(np.array(rates) < 0.1):.1%}", f"{np.mean(np.array(rates) > 2):.1%}"]
         print_row(method, cells)
@@ -148,7 +131,7 @@ def main():
         with warnings.catch_warnings():
             # Those of the peers.
             warnings.simplefilter("ignore")
-            of_people = np.array([spreads(y, times(y)) for y in people])
+            of_people = np.array([spreads(list(map(events, y)), times(y)) for y in people])
         means = [*of_people.mean(axis=0), of_people.mean()]
         print_row(method, [f"{mean:.2f}" for mean in means])
     children_table()

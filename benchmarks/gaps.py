@@ -1,6 +1,6 @@
 """How far key moments are missed where parts of the bodies were not seen.
 
-    python benchmarks/gaps.py DATA_FOLDER [--draws 1] [--patterns 4]
+    python benchmarks/gaps.py DATA_FOLDER
 
 Gaps are cut into the joint positions of the clips that constants were chosen on (harness.py). The
 true moments come from the positions without gaps. Three kinds:
@@ -108,11 +108,7 @@ def by_mean(cosines, action, positions):
     return [np.where(np.isnan(x), mean, x) for x in cosines]
 
 
-WAYS = {
-    "as they are": as_they_are,
-    "fill_gaps": by_fill_gaps,
-    "mean": by_mean,
-}
+WAYS = {"as they are": as_they_are, "fill_gaps": by_fill_gaps, "mean": by_mean}
 
 
 def to_cosines(action, positions):
@@ -145,21 +141,15 @@ def compare(people, actions, kind, seed, ways=WAYS):
 
 
 def main():
-    parser = command_line(__doc__)
-    parser.add_argument("--draws", type=int, default=1, help="of the gaps")
-    parser.add_argument("--patterns", type=int, default=4, help="patterns of an action")
-    options = parser.parse_args()
+    folder = command_line(__doc__).parse_args().folder
     warnings.simplefilter("ignore")
-    actions = read_actions(options.folder, JUDGED)
-    people = [People(action, options.patterns) for action in actions]
+    actions = read_actions(folder, JUDGED)
+    people = [People(action, patterns=4) for action in actions]
     whole = compare(people, actions, None, 0, {"as they are": as_they_are})["as they are"]
     for kind in KINDS:
-        runs_of = [compare(people, actions, kind, seed) for seed in range(options.draws)]
-        print_head(f"{kind}, errors over those without gaps", ["mean / median", "spread of draws"])
-        for name in runs_of[0]:
-            ratios = np.array([found[name] / whole for found in runs_of])
-            cells = [show_pair(ratios.mean(axis=0)), show_pair(np.ptp(ratios, axis=0))]
-            print_row(name, cells)
+        print_head(f"{kind}, errors over those without gaps", ["mean / median"])
+        for name, missed in compare(people, actions, kind, 0).items():
+            print_row(name, [show_pair(missed / whole)])
 
 
 if __name__ == "__main__":

@@ -142,11 +142,16 @@ def _summit(curve):
     rivals = peaks[height[peaks] > 0.75]
     if np.any(np.abs(rivals - top) > 0.08 * len(curve)):
         return np.nan
-    before, here, after = height[top - 1 : top + 2]
-    bend = before + after - 2 * here
-    # The vertex of the parabola through three frames.
-    part = np.clip((before - after) / (2 * bend), -0.5, 0.5) if bend < 0 else 0.0
-    return (top + part) / last
+    return vertex(height, top) / last
+
+
+def vertex(curve, frame):
+    """The extremum of the parabola through three frames, half a frame from the middle at most."""
+    if not 0 < frame < len(curve) - 1:
+        return float(frame)
+    before, here, after = curve[frame - 1 : frame + 2]
+    bend = before - 2 * here + after
+    return frame + (np.clip((before - after) / (2 * bend), -0.5, 0.5) if bend else 0)
 
 
 def turning_points(curve, turns):
@@ -360,12 +365,12 @@ class Judged:
 def on_time_line(times, moments):
     """How far a moment of one clip lands from that of another by way of a common time line.
 
-    ``times`` (n_clips, P) are the warps of all clips to one pattern, ``moments`` (n_clips,) the
-    frames of a moment, NaN where a clip does not show it. The moment of each clip is taken to the
-    time line of the pattern, and from there to each other clip. Returns the errors of all ordered
-    pairs, and the standard deviation of the moment on the time line, both in frames.
+    ``times`` (n_clips, n_frames) are the warps of all clips to one pattern, and ``moments``
+    (n_clips,) the frames of a moment, NaN where a clip does not show it. The moment of each clip is
+    taken to the time line of the pattern, and from there to each other clip. Returns the errors of
+    all ordered pairs, and the standard deviation of the moment on the time line, both in frames.
     """
-    seen, frames = np.flatnonzero(np.isfinite(moments)), np.arange(P)
+    seen, frames = np.flatnonzero(np.isfinite(moments)), np.arange(times.shape[1])
     # Frames of a warp that stands still are told apart by a slope too small to count.
     there = np.array([np.interp(moments[i], times[i] + 1e-7 * frames, frames) for i in seen])
     landed = np.array([np.interp(there, frames, times[i]) for i in seen])
@@ -443,6 +448,13 @@ def _logs(pair):
 
 
 # -- made movements ----------------------------------------------------------------------
+
+
+def at_frames(x, frames):
+    """A sequence (n_frames, ...) at moments between its frames, on straight lines."""
+    columns = x.reshape(len(x), -1).T
+    values = [np.interp(frames, np.arange(len(x)), column) for column in columns]
+    return np.stack(values, axis=1).reshape(-1, *x.shape[1:])
 
 
 def random_warp(rng, lowest, highest):

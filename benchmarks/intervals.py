@@ -11,7 +11,7 @@ import warnings
 from functools import partial
 
 import numpy as np
-from harness import P, command_line, print_head, read_people, run_tables
+from harness import P, command_line, percent, print_head, print_row, read_people, run_tables
 from joblib import Parallel, delayed
 from scipy.stats import spearmanr
 from sklearn.model_selection import GroupKFold
@@ -59,12 +59,13 @@ def people_table(folder):
     done = Parallel(n_jobs=-1)(delayed(judge)(one) for one in people)
     print_head("people held out", ["pairs", *FIGURES])
     for one, events in zip(people, done, strict=True):
-        show(f"{one.archive}: `{one.name}`", np.concatenate(list(events.values())))
+        rows = np.concatenate(list(events.values()))
+        show(f"{one.archive}: `{one.name}`", len(rows), rows.mean(axis=0))
     events = [rows for some in done for rows in some.values()]
     rows = np.concatenate(events)
-    show("**all**", rows)
+    show("**all**", len(rows), rows.mean(axis=0))
     equal = np.mean([row.mean(axis=0) for row in events], axis=0)
-    print(f"| each event alike | {len(events)} events | " + cells(equal) + " |")
+    show("each event alike", f"{len(events)} events", equal)
     print(f"\nA constant half-width of 90 %: {np.quantile(rows[:, 0], 0.9):.1f} frames.")
     overall = spearmanr(rows[:, 1], rows[:, 0])[0]
     print(f"Spearman over all {overall:.2f}, inside an event {rank_correlation(events):.2f}.")
@@ -75,13 +76,9 @@ def people_table(folder):
     print(f"Mean errors by quarter of half-width: {quarters}.\n", flush=True)
 
 
-def show(name, rows):
-    print(f"| {name} | {len(rows)} | " + cells(rows.mean(axis=0)) + " |")
-
-
-def cells(means, digits=1):
+def show(name, count, means):
     error, width, _, *held = means
-    return " | ".join([f"{x:.{digits}f}" for x in (error, width)] + [f"{h:.0%}" for h in held])
+    print_row(name, [str(count), f"{error:.1f}", f"{width:.1f}", *(f"{h:.0%}" for h in held)])
 
 
 # -- doubtful trials --------------------------------------------------------------------
@@ -132,18 +129,13 @@ def doubts_table(folder):
         others = [x for x in people if x is not one and x.archive == one.archive]
         work.append(delayed(doubts)(one, others))
     done = Parallel(n_jobs=-1)(work)
-    print_head("doubtful, people held out", [*WRONG, OTHER])
+    print_head("doubtful, %, people held out", [*WRONG, OTHER])
     supported = []
     for one, (shares, weak) in zip(people, done, strict=True):
         supported += [shares] * bool(weak == 0)
         mark = " (not supported)" * bool(weak > 0)
-        print(f"| {one.archive}: `{one.name}`{mark} | " + shown(shares) + " |")
-    means = np.nanmean(supported, axis=0)
-    print(f"| **mean of those supported** | {shown(means)} |\n", flush=True)
-
-
-def shown(shares):
-    return " | ".join("-" if np.isnan(share) else f"{share:.0%}" for share in shares)
+        print_row(f"{one.archive}: `{one.name}`{mark}", map(percent, shares))
+    print_row("**mean of those supported**", map(percent, np.nanmean(supported, axis=0)))
 
 
 if __name__ == "__main__":

@@ -45,7 +45,11 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.comparison import compare_groups, compare_to_norm
 from sklearn_motionsync.datasets import load_trials, make_bending
-from sklearn_motionsync.display import SynchronizationDisplay
+from sklearn_motionsync.display import (
+    ActionModelDisplay,
+    SkeletonDisplay,
+    SynchronizationDisplay,
+)
 from sklearn_motionsync.io import read_motion
 from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
 from sklearn_motionsync.model import find_departures
@@ -157,6 +161,15 @@ class Data:
         return self._points("depositFloorR")
 
     @cached_property
+    def many_hops(self):
+        """100 trials: hops again and again, each with a random walk of its own."""
+        rng, X = np.random.default_rng(3), []
+        for i in range(100):
+            x = self.hops[i % len(self.hops)]
+            X.append(x + 0.02 * rng.standard_normal(x.shape).cumsum(axis=0) / np.sqrt(50))
+        return X
+
+    @cached_property
     def simulated(self):
         """40 bends of the embedded action."""
         return make_bending(40, random_state=0)
@@ -207,6 +220,11 @@ def fit(make, *training):
     return Work(lambda: make().fit(*training))
 
 
+def of_all(estimator, X, method="transform"):
+    """A method of an estimator that is fitted to the same trials."""
+    return Work(partial(getattr(estimator.fit(X), method), X))
+
+
 def each(method, X, count=10):
     """A method of one trial at a time, so many times."""
 
@@ -215,6 +233,11 @@ def each(method, X, count=10):
             method(X[i : i + 1])
 
     return Work(run, count)
+
+
+def lone(estimator, X, method="transform"):
+    """A method of an estimator that is fitted to all, of one trial at a time."""
+    return each(getattr(estimator.fit(X), method), X)
 
 
 def with_model():
@@ -228,7 +251,12 @@ def on_model(data, method):
     return Work(partial(method, pipe))
 
 
-def detector_of_positions(data):
+def detector():
+    """A detector of what is on the clock."""
+    return ActionDetector(with_model())
+
+
+def detector_pipe(data):
     """A detector that is given joint positions."""
     cosines = DirectionCosines(data.hdm05.skeleton)
     return ActionDetector(make_pipeline(cosines, ASpace(0.95), dense(), ActionModel()))
@@ -237,6 +265,11 @@ def detector_of_positions(data):
 def online(data):
     """A fitted synchronizer of running movements."""
     return OnlineSynchronizer(dense(), frame_rate=120).fit(data.hops)
+
+
+def tracker():
+    """A tracker of hidden and noisy joints."""
+    return MotionTracker(dense(), frame_rate=120, random_state=0)
 
 
 def steps(estimator, frames):
@@ -271,14 +304,30 @@ def part_sync(data):
     return fit(lambda: PartSynchronizer(parts=parts), data.hops_on_clock)
 
 
-def clf_predict30(data):
-    classifier = ActionClassifier().fit(*three_actions(20, 0))
+def keyframe_ft(data):
+    X, keyframes = data.hops_on_clock, np.full((33, 1), 50.0)
+    return Work(lambda: LinearSynchronizer(P).fit_transform(X, keyframes=keyframes))
+
+
+def model_only_score(data):
+    return of_all(ActionModel(), dense().fit_transform(data.hops_on_clock), "score_samples")
+
+
+def classified(classifier):
+    """The actions of 30 trials, by a classifier of 60 others."""
+    classifier.fit(*three_actions(20, 0))
     return Work(partial(classifier.predict, three_actions(10, 50)[0]))
 
 
-def search_sync_20000(data):
-    query, take = dense().fit(warped_sines(20)), long_take()
-    return Work(lambda: find_trials(query, take))
+def searched(query):
+    """The search for a trial in a long take."""
+    return Work(partial(find_trials, query, long_take()))
+
+
+def cosines_1e5(data):
+    poses = data.simulated.data
+    take = [np.resize(poses[0], (100_000, *poses[0].shape[1:]))]
+    return Work(partial(DirectionCosines(data.simulated.skeleton).fit(poses).transform, take))
 
 
 def aspace_fit(data):
@@ -307,8 +356,20 @@ def disp_sync(data):
     return drawn(lambda: SynchronizationDisplay.from_estimator(sync, data.hops_on_clock))
 
 
-def interval33(data):
-    return Work(dense().fit(data.hops_on_clock).match(data.hops_on_clock).interval)
+def disp_model(data):
+    pipe = with_model().fit(data.hops_on_clock)
+    return drawn(lambda: ActionModelDisplay.from_estimator(pipe, data.hops_on_clock))
+
+
+def disp_skeleton(data):
+    bunch = data.simulated
+    return drawn(lambda: SkeletonDisplay.from_positions(bunch.data[0], skeleton=bunch.skeleton))
+
+
+def of_match(data, method):
+    """A method of the match of the hops."""
+    match = dense().fit(data.hops_on_clock).match(data.hops_on_clock)
+    return Work(getattr(match, method))
 
 
 def blend(data):
@@ -348,45 +409,71 @@ JOBS = {
     "fit_hops33": lambda data: fit(dense, data.hops_on_clock),
     "fit_bends24": lambda data: fit(dense, data.bends),
     "fit_sim40": lambda data: fit(dense, data.simulated_points),
+    "fit_people100": lambda data: fit(dense, data.many_hops),
     "fit_curves400": lambda data: fit(dense, warped_sines(400)),
+    "fit_n10": lambda data: fit(dense, data.hops_on_clock[:10]),
+    "fit_n2": lambda data: fit(dense, data.hops_on_clock[:2]),
     "fit_1feature": lambda data: fit(dense, data.hop_feature),
     "paper64_source": lambda data: fit(paper, data.copies),
+    "paper32_source": lambda data: fit(paper, np.float32(data.copies)),
+    "paper64_walks": lambda data: fit(paper, data.walks),
     "paper32_walks": lambda data: fit(paper, np.float32(data.walks)),
-    "lone_hops": lambda data: each(dense().fit(data.hops_on_clock).transform, data.hops_on_clock),
-    "lone_paper": lambda data: each(paper().fit(data.walks).transform, data.walks),
-    "lone_1feature": lambda data: each(dense().fit(data.hop_feature).transform, data.hop_feature),
+    "paper_fit_transform": lambda data: Work(lambda: paper().fit_transform(data.walks)),
+    "fit_transform_hops": lambda data: Work(lambda: dense().fit_transform(data.hops_on_clock)),
+    "lone_hops": lambda data: lone(dense(), data.hops_on_clock),
+    "lone_bends": lambda data: lone(dense(), data.bends),
+    "lone_source": lambda data: lone(dense(), data.copies),
+    "lone_walks": lambda data: lone(dense(), data.walks),
+    "lone_paper": lambda data: lone(paper(), data.walks),
+    "lone_1feature": lambda data: lone(dense(), data.hop_feature),
+    "all_hops33": lambda data: of_all(dense(), data.hops_on_clock),
+    "all_source40": lambda data: of_all(dense(), data.copies),
+    "all_paper40": lambda data: of_all(paper(), data.walks),
+    "match_hops33": lambda data: of_all(dense(), data.hops_on_clock, "match"),
     "part_sync": part_sync,
-    "linear_ft": lambda data: Work(
-        lambda: LinearSynchronizer(n_frames=P).fit_transform(data.hops_on_clock)
-    ),
+    "linear_ft": lambda data: Work(lambda: LinearSynchronizer(P).fit_transform(data.hops_on_clock)),
+    "keyframe_ft": keyframe_ft,
     "model_fit": lambda data: fit(with_model, data.hops_on_clock),
-    "model_predict": lambda data: on_model(data, lambda pipe: pipe.predict(data.hops_on_clock)),
+    "model_only_fit": lambda data: fit(ActionModel, dense().fit_transform(data.hops_on_clock)),
+    "model_predict": lambda data: of_all(with_model(), data.hops_on_clock, "predict"),
+    "model_score_samples": lambda data: of_all(with_model(), data.hops_on_clock, "score_samples"),
+    "model_only_score": model_only_score,
+    "model_sample": lambda data: on_model(data, lambda pipe: pipe[-1].sample(20, random_state=0)),
     "departures": lambda data: on_model(
         data, lambda pipe: find_departures(pipe, data.hops_on_clock[:5])
     ),
-    "detector_fit": lambda data: fit(partial(detector_of_positions, data), data.hop_positions),
-    "detector_predict": lambda data: Work(
-        partial(detector_of_positions(data).fit(data.hop_positions).predict, data.hop_positions)
+    "detector_fit": lambda data: fit(detector, data.hops_on_clock),
+    "detector_predict": lambda data: of_all(detector(), data.hops_on_clock, "predict"),
+    "detector_lone": lambda data: lone(detector(), data.hops_on_clock, "predict"),
+    "detectorpipe_fit": lambda data: fit(partial(detector_pipe, data), data.hop_positions),
+    "detectorpipe_predict": lambda data: of_all(detector_pipe(data), data.hop_positions, "predict"),
+    "detectorpipe_lone": lambda data: lone(detector_pipe(data), data.hop_positions, "predict"),
+    "clf_fit60": lambda data: fit(ActionClassifier, *three_actions(20, 0)),
+    "clf_predict30": lambda data: classified(ActionClassifier()),
+    "clf_lone": lambda data: each(
+        ActionClassifier().fit(*three_actions(20, 0)).predict, warped_sines(5, seed=9), 5
     ),
-    "detector_lone": lambda data: each(
-        detector_of_positions(data).fit(data.hop_positions).predict, data.hop_positions
+    "clf_reject_fit60": lambda data: fit(
+        partial(ActionClassifier, reject_below="auto"), *three_actions(20, 0)
     ),
-    "clf_predict30": clf_predict30,
-    "search_sync_20000": search_sync_20000,
+    "clf_reject_predict30": lambda data: classified(ActionClassifier(reject_below="auto")),
+    "search_20000": lambda data: searched(warped_sines(1)[0]),
+    "search_sync_20000": lambda data: searched(dense().fit(warped_sines(20))),
     "live_step": lambda data: steps(online(data), data.hops[0]),
+    "live_fit": lambda data: fit(partial(OnlineSynchronizer, dense(), frame_rate=120), data.hops),
     "live_step8": lambda data: steps(online(data), np.stack([data.hops[0]] * 8, axis=1)),
-    "tracker_fit": lambda data: fit(
-        partial(MotionTracker, dense(), frame_rate=120, random_state=0), data.hops
+    "tracker_fit": lambda data: fit(tracker, data.hops),
+    "tracker_track": lambda data: Work(
+        partial(tracker().fit(data.hops).track, data.hops[:1]), len(data.hops[0])
     ),
-    "tracker_step": lambda data: steps(
-        MotionTracker(dense(), frame_rate=120, random_state=0).fit(data.hops), data.hops[0]
+    "tracker_smooth": lambda data: Work(
+        partial(tracker().fit(data.hops).smooth, data.hops[:1]), len(data.hops[0])
     ),
-    "cosines_hops": lambda data: Work(
-        partial(
-            DirectionCosines(data.hdm05.skeleton).fit(data.hdm05.data).transform,
-            list(data.hdm05.data),
-        )
+    "tracker_step": lambda data: steps(tracker().fit(data.hops), data.hops[0]),
+    "cosines_hops": lambda data: of_all(
+        DirectionCosines(data.hdm05.skeleton), list(data.hdm05.data)
     ),
+    "cosines_1e5": cosines_1e5,
     "aspace_fit": aspace_fit,
     "read_bvh": lambda data: Work(partial(read_motion, data.recorded("bvh/007_01.bvh"))),
     "read_c3d": read_c3d,
@@ -394,13 +481,19 @@ JOBS = {
     "cycles_fit": lambda data: fit(partial(CycleSegmenter, start=0), [long_walk()]),
     "cycles_segment": cycles_segment,
     "pairwise_velocity": lambda data: Work(partial(synchronization_distances, data.hops_on_clock)),
+    "pairwise_pose": lambda data: Work(
+        partial(synchronization_distances, data.hops_on_clock, cost="pose")
+    ),
     "disp_sync": disp_sync,
+    "disp_model": disp_model,
+    "disp_skeleton": disp_skeleton,
+    "to_frame_match": lambda data: of_match(data, "to_frame"),
     "blend": blend,
     "clone_params": clone_params,
     "compare_groups40": compare_groups40,
     "compare_norm": compare_norm,
     "report40": report40,
-    "interval33": interval33,
+    "interval33": lambda data: of_match(data, "interval"),
 }
 
 # -- the process ------------------------------------------------------------------------

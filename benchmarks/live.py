@@ -25,6 +25,7 @@ import numpy as np
 from harness import (
     EVENTS,
     P,
+    at_frames,
     command_line,
     print_head,
     print_row,
@@ -59,20 +60,13 @@ class Known(NamedTuple):
     def ticks(self, clip):
         """The clip at its ticks: (n_ticks, n_features)."""
         n_ticks = int((len(clip) - 1) / self.tick + 1e-9) + 1
-        return sampled(clip, np.minimum(np.arange(n_ticks) * self.tick, len(clip) - 1))
+        return at_frames(clip, np.minimum(np.arange(n_ticks) * self.tick, len(clip) - 1))
 
     def at_frames(self, phases, n_frames):
         """Phases at ticks as phases at frames: between two ticks it goes on at the mean pace."""
         frames = np.arange(n_frames) / self.tick
         last = np.minimum((frames + 1e-9).astype(int), len(phases) - 1)
         return np.minimum(np.asarray(phases)[last] + frames - last, len(self.mean) - 1)
-
-
-def sampled(x, times):
-    """A sequence at times between its frames."""
-    before = np.clip(np.floor(times).astype(int), 0, len(x) - 2)
-    part = (times - before)[:, np.newaxis]
-    return x[before] * (1 - part) + x[before + 1] * part
 
 
 def backward_velocity(x):
@@ -87,30 +81,6 @@ def backward_velocity(x):
 # -- time warping -----------------------------------------------------------------------
 
 
-def _compared(known, clip, kind):
-    """What time warping compares: clip and pattern as poses or one-sided velocities."""
-    pair = known.ticks(clip), known.mean
-    return pair if kind == "poses" else tuple(backward_velocity(x) for x in pair)
-
-
-def open_end_dtw(known, clip, kind="velocities"):
-    """DTW with the usual steps whose end is free: the best cell of the row by its path's length."""
-    costs = cdist(*_compared(known, clip, kind))
-    columns = np.arange(costs.shape[1])
-    row, phases = None, []
-    for i, cost in enumerate(costs):
-        along = np.cumsum(cost)
-        if row is None:
-            row = along
-        else:
-            # Either from the row before, the diagonal costing double, or along this row.
-            enter = row + cost
-            enter[1:] = np.minimum(enter[1:], row[:-1] + 2 * cost[1:])
-            row = along + np.minimum.accumulate(enter - along)
-        phases.append(np.argmin(row / (i + columns + 1)))
-    return known.at_frames(phases, len(clip))
-
-
 def dixon(known, clip, kind="velocities", window=5, max_run=2):
     """On-line time warping: a window that goes on by rows, columns or both, greedily.
 
@@ -119,7 +89,9 @@ def dixon(known, clip, kind="velocities", window=5, max_run=2):
     ``max_run`` of a kind it is the other's turn. A path pays double for a diagonal step. Window and
     run are the best of fifteen pairs on UTKinect.
     """
-    warping = Dixon(cdist(*_compared(known, clip, kind)), window, max_run)
+    pair = known.ticks(clip), known.mean
+    pair = pair if kind == "poses" else map(backward_velocity, pair)
+    warping = Dixon(cdist(*pair), window, max_run)
     phases = [warping.next() for _ in range(len(warping.costs))]
     return known.at_frames(phases, len(clip))
 
@@ -185,8 +157,6 @@ class Dixon:
 
 
 PEERS = {
-    "open-end DTW, velocities": open_end_dtw,
-    "open-end DTW, poses": functools.partial(open_end_dtw, kind="poses"),
     "Dixon's online DTW, velocities": dixon,
     "Dixon's online DTW, poses": functools.partial(dixon, kind="poses"),
 }
@@ -373,11 +343,6 @@ def interval_table(folder):
             print_row(condition, [*cells, f"{width:.1f}"])
 
 
-TABLES = {
-    "phase": phase_table,
-    "intervals": interval_table,
-}
-
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    run_tables(TABLES, command_line(__doc__))
+    run_tables({"phase": phase_table, "intervals": interval_table}, command_line(__doc__))

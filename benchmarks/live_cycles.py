@@ -19,8 +19,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from cycles import foot_strikes, read
-from harness import P, command_line, print_head, print_row, run_tables
+from cycles import foot_strikes, read, turned
+from harness import P, at_frames, command_line, print_head, print_row, run_tables
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Skeleton
 from sklearn_motionsync.live import OnlineSynchronizer
 from sklearn_motionsync.takes import CycleSegmenter
@@ -85,20 +85,6 @@ def upright(positions, skeleton):
     return turned(points, np.arctan2(across[:, 2], across[:, 0]))
 
 
-def turned(points, angles):
-    """Points (n_frames, n, 3) turned about the vertical."""
-    c, s = np.cos(angles)[:, np.newaxis], np.sin(angles)[:, np.newaxis]
-    x, y, z = np.moveaxis(points, 2, 0)
-    return np.stack([c * x + s * z, y, c * z - s * x], axis=2)
-
-
-def at_frames(x, frames):
-    """Values (n_frames, ...) at frames with fractions."""
-    flat = x.reshape(len(x), -1)
-    found = [np.interp(frames, np.arange(len(x)), column) for column in flat.T]
-    return np.stack(found, axis=1).reshape(-1, *x.shape[1:])
-
-
 def whole_cycles(points, strikes, others, phase):
     """Yield cycles from strike to strike, and the share of each frame, ``phase`` at the other's."""
     for first, stop in pairwise(strikes):
@@ -141,10 +127,6 @@ def travelling(points, rate):
 # -- people -------------------------------------------------------------------------------
 
 
-def follow_cycles(cycles, rate):
-    return OnlineSynchronizer(DenseSynchronizer(P), frame_rate=rate, cyclic=True).fit(cycles)
-
-
 def walkers(takes, start, others):
     """Yield a `Walker` of each person with cycles; others are {name: takes of no such movement}."""
     for person in dict.fromkeys(takes.people):
@@ -152,8 +134,9 @@ def walkers(takes, start, others):
         segmenter = CycleSegmenter(takes.skeleton, start=start, not_cyclic="skip")
         cycles, _ = segmenter.fit(known.data).segment(known.data)
         cosines = DirectionCosines(takes.skeleton).fit(cycles)
-        live = follow_cycles(cosines.transform(cycles), takes.rate)
-        phase = phase_of_other_foot(live, cosines.transform(cycles), cycles, takes, start)
+        features = cosines.transform(cycles)
+        live = OnlineSynchronizer(DenseSynchronizer(P), frame_rate=takes.rate, cyclic=True)
+        phase = phase_of_other_foot(live.fit(features), features, cycles, takes, start)
         own = []
         for x in takes.of(person).data:
             strikes = foot_strikes(x, takes.skeleton, takes.rate)

@@ -19,7 +19,7 @@ import argparse
 import importlib.util
 
 import numpy as np
-from harness import print_head, print_row
+from harness import at_frames, print_head, print_row
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import DenseSynchronizer
 
@@ -55,9 +55,7 @@ def make_trials(seed, kind="one knot"):
 
 def sample(pattern, positions):
     """A pattern (bins, neurons) at positions (trials, bins), linearly between its bins."""
-    left, part = split(positions)
-    part = part[..., np.newaxis]
-    return (1 - part) * pattern[left] + part * pattern[left + 1]
+    return at_frames(pattern, positions.ravel()).reshape(*positions.shape, -1)
 
 
 def split(positions):

@@ -18,7 +18,7 @@ import warnings
 
 import numpy as np
 from exercises import read_exercises
-from harness import command_line, print_head, print_row, run_tables
+from harness import at_frames, command_line, print_head, print_row, run_tables
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -71,8 +71,7 @@ def study(seed, n_people, n_strides, n_cycles):
 def made_late(x, largest):
     """A trial whose middle is later by a share of its time."""
     t = np.linspace(0, 1, len(x))
-    moments = t - largest * np.sin(np.pi * t) ** 2
-    return np.stack([np.interp(moments, t, column) for column in x.T], axis=1)
+    return at_frames(x, (len(x) - 1) * (t - largest * np.sin(np.pi * t) ** 2))
 
 
 def people(folder):

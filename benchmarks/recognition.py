@@ -264,11 +264,6 @@ def actors_left_out(actors):
 SPLITS, LEFT_OUT, AREA = "ten splits", "leave one subject out", "AUC of unknown actions"
 
 
-def share_right(recognizer, recordings, train, test):
-    """The share of a fold that is recognised."""
-    return np.mean(recognizer.predict(train, test) == recordings.actions[test])
-
-
 def unknown_area(recognizer, actions, action, train, test):
     """How well the novelty tells an action that nothing was learnt of; NaN if nobody tests it."""
     unknown = actions[test] == action
@@ -285,8 +280,10 @@ def recognition_table(recordings, splits):
         if package is not None and version_of(package) is None:
             continue
         one = make(recordings)
-        right = [share_right(one, recordings, *split) for split in splits]
-        others = [share_right(one, recordings, *fold) for fold in left_out]
+        right, others = (
+            [np.mean(one.predict(*fold) == recordings.actions[fold[1]]) for fold in folds]
+            for folds in (splits, left_out)
+        )
         areas = Parallel(n_jobs=-1)(
             delayed(unknown_area)(one, recordings.actions, action, train, test)
             for train, test in splits

@@ -131,6 +131,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import *
 from sklearn_motionsync.body import *
 from sklearn_motionsync.comparison import *
+from sklearn_motionsync.display import *
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.gait import *
 from sklearn_motionsync.io import keyframes_from_events, read_motion
@@ -228,7 +229,7 @@ REVEALED = {
     "sync.match(X).rates": "ndarray",
     "sync.match(X).to_frame()": "DataFrame|Any",
     "Skeleton.paper()": "Skeleton",
-    "display.TrellisDisplay.from_estimator(sync, X)": "TrellisDisplay",
+    "TrellisDisplay.from_estimator(sync, X)": "TrellisDisplay",
 }
 
 

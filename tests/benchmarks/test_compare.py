@@ -43,7 +43,7 @@ def test_every_job_has_a_name_of_its_own():
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "JOBS"
     )
     names = [ast.literal_eval(key) for key in jobs.keys]
-    assert len(set(names)) == len(names) == 41
+    assert len(set(names)) == len(names) == 76
 
 
 def test_a_process_lists_prepares_and_runs_jobs(worker):

@@ -65,18 +65,6 @@ def path_costs(costs):
     return total
 
 
-def test_open_end_dtw_equals_the_row_minimum(live, known):
-    clip = curve(np.linspace(0, 90, 170)) + 0.05 * np.random.default_rng(0).standard_normal(
-        (170, 3)
-    )
-    ticks = known.ticks(clip)
-    total = path_costs(cdist(ticks, known.mean))
-    i, j = np.indices(total.shape)
-    expected = (total / (i + j + 1)).argmin(axis=1)
-    found = live.open_end_dtw(known, clip, kind="poses")
-    np.testing.assert_array_equal(found[:: round(known.tick)], expected)
-
-
 def test_dixon_with_full_window_equals_dtw(live, known):
     clip = curve(np.linspace(0, 99, 199))
     costs = cdist(known.ticks(clip), known.mean)
