@@ -114,6 +114,10 @@ _NOW = {
 }
 
 
+def __dir__():
+    return sorted([*__all__, *_ROOMS, "__version__"])
+
+
 def __getattr__(name):
     """Import a room when it is first asked for, and name the new place of a name from before."""
     if name in _ROOMS:

@@ -487,7 +487,7 @@ TOO_LITTLE = {
     "ASpace": (lambda X: X[0][:1], "at least 2 poses"),
     "FrameWise": (lambda X: X[0][:1], "n_components=2 must be between"),
     **dict.fromkeys(
-        ["ActionModel", "ActionDetector", "MotionTracker"], (lambda X: X[:1], "at least 2 perf")
+        ["ActionModel", "ActionDetector", "MotionTracker"], (lambda X: X[:1], "at least 2 trials")
     ),
     "ActionClassifier": (lambda X: X[:1], "at least 2 classes"),
     "CycleSegmenter": (lambda X: [x[:40] for x in X], "Trial 0: "),

@@ -240,9 +240,11 @@ class GroupsOfPeople:
     def of(cls, y, groups, n):
         """Those of n trials; without groups, every trial is of another person."""
         codes, labels = encode_groups(y, n, name="y")
+        persons, _ = encode_groups(groups, n)
         if y is None:
             codes, labels = np.zeros(n, dtype=int), [""]
-        persons, _ = encode_groups(groups, n)
+        elif groups is not None:
+            refuse_classes_as_people(codes, persons)
         makers, members_of, counts = [], [], []
         for k in range(len(labels)):
             means = _means(persons, codes == k)

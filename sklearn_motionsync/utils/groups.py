@@ -112,7 +112,7 @@ def refuse_classes_as_people(classes, people):
         raise ValueError(
             f"groups tells the same {n_people} sets of trials apart as y. y is what trials are "
             "told apart by, such as a condition, and groups is whose they are: give the person of "
-            "each trial, or leave groups out."
+            "each trial."
         )
 
 
