@@ -13,6 +13,7 @@
 """
 
 from importlib import import_module
+from inspect import currentframe
 
 from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
@@ -123,5 +124,8 @@ def __getattr__(name):
     if name in _ROOMS:
         return import_module(f".{name}", __name__)
     if name in _NOW:
-        raise ImportError(f"sklearn_motionsync.{name} is sklearn_motionsync.{_NOW[name]} now.")
+        # An import says what is wrong only if this is no AttributeError, which hasattr needs.
+        is_import = currentframe().f_back.f_code.co_name == "_handle_fromlist"
+        error = ImportError if is_import else AttributeError
+        raise error(f"sklearn_motionsync.{name} is sklearn_motionsync.{_NOW[name]} now.")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

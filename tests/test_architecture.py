@@ -197,6 +197,9 @@ def test_rooms_are_there_without_an_import_of_their_own(name):
 def test_old_names_tell_the_new_ones(name, now):
     message = re.escape(f"sklearn_motionsync.{name} is sklearn_motionsync.{now} now.")
     with pytest.raises(ImportError, match=message):
+        exec(f"from sklearn_motionsync import {name}")
+    with pytest.raises(AttributeError, match=message):
         getattr(sklearn_motionsync, name)
+    assert not hasattr(sklearn_motionsync, name)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         sklearn_motionsync.nothing  # noqa: B018
