@@ -26,6 +26,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "mathml",
     "myst_plot",
+    "rooms",
     "tidy",
 ]
 exclude_patterns = ["_build", "_templates", "**.ipynb"]

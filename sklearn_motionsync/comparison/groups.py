@@ -145,8 +145,8 @@ def compare_groups(
 ) -> GroupComparison:
     """Test whether groups differ in the shape of their curves, in their timing, and where.
 
-    All trials are on the clock of one pattern. The aligned curves hold the shape, the offsets the
-    timing. Both are tested together and apart, by permutations of people.
+    All trials are on the clock of one pattern: aligned curves hold the shape, offsets the timing.
+    Both are tested together and apart, by permutations of people.
 
     Parameters
     ----------
@@ -155,11 +155,11 @@ def compare_groups(
     X : trials
         As the estimator takes them.
     y : sequence of length n_sequences
-        What the trials are told apart by: the label of the group of each, such as a condition, of
-        two or more; or with ``covariate`` a number for each, such as speed or age.
+        What the trials are told apart by: the group of each, such as a condition, of two or more;
+        or with ``covariate`` a number for each, such as speed or age.
     groups : sequence of length n_sequences, default=None
-        Whose the trials are: the subject of each. The mean of the trials of a person, with one
-        label, is one unit. By default every trial is of another person.
+        The subject of each trial: the mean of a person's trials of one label is one unit. By
+        default every trial is of another person.
     covariate : bool, default=False
         Whether ``y`` are numbers: a regression.
     paired : bool, default=False
@@ -197,9 +197,8 @@ def compare_groups(
     Raises
     ------
     ValueError
-        If ``y`` has one label only, or numbers without ``covariate``; ``groups`` tells the same
-        trials apart as ``y``; there are too few people; people have several labels without
-        ``paired``, or with it one only; there are gaps; there is no such unit or feature.
+        If ``y`` or ``groups`` are not as above; there are too few people, or they have several
+        labels without ``paired``; there are gaps; there is no such unit or feature.
 
     See Also
     --------
@@ -245,8 +244,7 @@ def compare_groups(
         unit=unit,
         frame_rate=frame_rate,
     )
-    n = len(aligned.curves)
-    study = Study.of(y, groups, covariate=covariate, paired=paired, n=n)
+    study = Study.of(y, groups, covariate=covariate, paired=paired, n=len(aligned.curves))
     return compare_aligned(aligned, study, level, n_permutations, random_state, n_jobs, verbose)
 
 
