@@ -10,8 +10,9 @@ def resolve(app, env, node, contnode):
     objects, target = env.get_domain("py").objects, node["reftarget"]
     names = [
         name
-        for name in objects
+        for name, entry in objects.items()
         if name.startswith("sklearn_motionsync.") and name.endswith(f".{target}")
+        if not entry.aliased
     ]
     if len(names) != 1:
         return None

@@ -182,8 +182,8 @@ def compare_groups(
     random_state : int, RandomState instance or None, default=0
         Draws the permutations.
     n_jobs : int, default=None
-        How many jobs share the permutations. None means 1 unless in a ``joblib.parallel_config``
-        context, -1 all cores. Results are the same to the last bit.
+        Jobs that share the permutations, with the same result. None means 1 unless in a
+        ``joblib.parallel_config`` context, -1 all cores.
     verbose : int, default=0
         Above 0, print how far the permutations are, at most once a second.
     **params : dict
@@ -211,16 +211,15 @@ def compare_groups(
        deviates z of the same tail probability. So features and offsets count alike.
     2. Neighbouring frames add up by threshold-free cluster enhancement (Smith and Nichols,
        *NeuroImage* 44, 2009): the sum over heights h below z of ``extent^0.5 h^2``.
-    3. The largest value over all frames and features, in each permutation, gives p of shape; over
-       all frames of the offset, p of timing. The smaller of both, in each permutation, gives the
-       joint p (Tippett). Clusters are corrected by it.
+    3. In each permutation the largest value over all frames and features gives p of shape, that of
+       the offset p of timing, and the smaller of both the joint p (Tippett), for clusters, too.
     4. A cluster of timing is listed if at least half of it is left whichever signal is left out of
        the match (of more than eight, an eighth of them), as a warp may take a difference in the
        shape of one signal for timing. ``p_timing`` is of the offsets as they are.
 
     Examples
     --------
-    Group B pushes off later, by 5 % of the gait cycle.
+    Group B pushes off later, by 5 % of the gait cycle:
 
     >>> from sklearn_motionsync import DenseSynchronizer
     >>> from sklearn_motionsync.comparison import compare_groups
