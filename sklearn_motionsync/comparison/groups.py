@@ -213,9 +213,8 @@ def compare_groups(
        *NeuroImage* 44, 2009): the sum over heights h below z of ``extent^0.5 h^2``.
     3. In each permutation the largest value over all frames and features gives p of shape, that of
        the offset p of timing, and the smaller of both the joint p (Tippett), for clusters, too.
-    4. A cluster of timing is listed if at least half of it is left whichever signal is left out of
-       the match (of more than eight, an eighth of them), as a warp may take a difference in the
-       shape of one signal for timing. ``p_timing`` is of the offsets as they are.
+    4. A cluster of timing is listed if at least half of it is left whichever signal (of more than
+       eight, an eighth of them) is left out of the match. ``p_timing`` is of all signals.
 
     Examples
     --------
