@@ -266,7 +266,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray of int, shape (n_sequences,)
             1 if the score is below its limit, and all contrasts are above theirs; else -1.
         """
-        scores = self._judge(X, reference, params, "predict")["score"].to_numpy()
+        scores = self._test(X, reference, params, "predict")[0]
         return np.where(scores <= 1, 1, -1)
 
     def decision_function(
@@ -289,7 +289,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray, shape (n_sequences,)
             ``score_samples`` less ``offset_``: negative for trials that are rejected.
         """
-        return 1 - self._judge(X, reference, params, "decision_function")["score"].to_numpy()
+        return 1 - self._test(X, reference, params, "decision_function")[0]
 
     def score_samples(
         self, X: TrialsLike, reference: TrialsLike | None = None, **params: Any
@@ -311,7 +311,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray, shape (n_sequences,)
             At least ``offset_`` for trials that are accepted.
         """
-        return -self._judge(X, reference, params, "score_samples")["score"].to_numpy()
+        return -self._test(X, reference, params, "score_samples")[0]
 
     def report(
         self, X: TrialsLike, reference: TrialsLike | None = None, **params: Any
@@ -337,7 +337,19 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             those that are too short or too weak. ``score``: up to 1 is accepted. ``reason`` of a
             rejection, such as "too long, too weak"; empty if the trial is accepted.
         """
-        return self._judge(X, reference, params, "report")
+        scores, trials, statistics, tails, acceptance = self._test(X, reference, params, "report")
+        labels, levels = labels_of_input(X, trials)
+        table = pd.DataFrame(statistics, index=index_of(labels, levels[:-1]))
+        table["score"] = scores
+        # What no test alone explains is that which adds most to the score.
+        names, shares = list(tails), acceptance.shares(tails)
+        reasons = []
+        for i, score in enumerate(scores):
+            of_one = {name: values[i] for name, values in statistics.items()}
+            most = names[first_largest(shares[i])]
+            reasons.append(_reason(of_one, most) if score > 1 else "")
+        table["reason"] = reasons
+        return table
 
     def get_metadata_routing(self):
         """The metadata that the detector requests, and routes to its pipeline.
@@ -423,8 +435,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             if c.is_clear or (name in always and c.middle > 0)
         }
 
-    def _judge(self, X, reference, params, method):
-        """The table of `report`."""
+    def _test(self, X, reference, params, method):
+        """Scores of trials, and the trials and what their reasons are found in."""
         check_is_fitted(self)
         tests, caller = self._tests, f"ActionDetector.{method}"
         try:
@@ -480,18 +492,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             statistics[name] = contrast.standardize(filled)
             # More like the image than like the action.
             far = np.maximum(far, statistics[name])
-        labels, levels = labels_of_input(X, trials)
-        table = pd.DataFrame(statistics, index=index_of(labels, levels[:-1]))
-        table["score"] = np.where(far > 1, np.maximum(scores, far), scores)
-        # What no test alone explains is that which adds most to the score.
-        names, shares = list(tails), acceptance.shares(tails)
-        reasons = []
-        for i, score in enumerate(table["score"]):
-            of_one = {name: values[i] for name, values in statistics.items()}
-            most = names[first_largest(shares[i])]
-            reasons.append(_reason(of_one, most) if score > 1 else "")
-        table["reason"] = reasons
-        return table
+        scores = np.where(far > 1, np.maximum(scores, far), scores)
+        return scores, trials, statistics, tails, acceptance
 
 
 def _check_steps(pipeline):
