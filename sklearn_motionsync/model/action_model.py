@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from numbers import Integral, Real
 from typing import Self
@@ -19,6 +20,7 @@ from ..inputs.types import Labels, RandomState, TrialLike, TrialsLike, ValuesLik
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..inputs.wording import counted
 from ..matching.gaps import fill_with_mean, is_gappy
+from ..synchronizers.learning import SynchronizationWarning
 from ..synchronizers.match import STANDARD, Match
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups, group_counts, refuse_classes_as_people
@@ -40,6 +42,8 @@ __all__ = ["ActionModel"]
 # Smallest variance of a density, as a share of the variance of all the data: a deviation in a
 # constant feature is not infinitely improbable.
 _VARIANCE_FLOOR = 1e-9
+# Two people can have fewer trials than these.
+_MANY_OF_TWO = 20
 
 
 class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
@@ -184,6 +188,14 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         codes, _ = encode_groups(groups, len(trials), at_least=2)
         if groups is not None and y is not None:
             refuse_classes_as_people(encode_groups(y, len(trials), name="y")[0], codes)
+        if groups is not None and codes.max() == 1 and len(trials) >= _MANY_OF_TWO:
+            warnings.warn(
+                f"groups names two people for {len(trials)} trials: how people vary is learnt from "
+                "two, so that hardly anything is refused. If groups are conditions, give the "
+                "person of each trial instead.",
+                SynchronizationWarning,
+                stacklevel=3,
+            )
         with self._progress(fits=True):
             stream = TrialStream.starting_at(trials[0])
             learnt = self._learn(stream, trials, groups)

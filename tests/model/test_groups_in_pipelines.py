@@ -5,7 +5,13 @@ import pytest
 from sklearn import config_context
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_validate
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    SynchronizationWarning,
+)
 from sklearn_motionsync.datasets import make_bending
 
 BUNCH = make_bending(12, n_frames=30, style=1, random_state=0)
@@ -41,3 +47,13 @@ def test_groups_are_routed(expected):
         search = GridSearchCV(pipe, {"actionmodel__coverage": [0.95]}, cv=CV)
         search.fit(BUNCH.data, groups=GROUPS)
         assert search.best_estimator_[-1].threshold_ == expected[-1]
+
+
+def test_conditions_in_the_place_of_people_are_told():
+    X = np.random.default_rng(0).standard_normal((40, 20, 2)).cumsum(axis=1)
+    condition, person = ["before", "after"] * 20, np.arange(40) // 4
+    with pytest.warns(SynchronizationWarning, match="groups names two people for 40 trials"):
+        wide = ActionModel().fit(X, groups=condition)
+    assert ActionModel().fit(X, groups=person).threshold_ < wide.threshold_
+    with pytest.raises(ValueError, match="the same 2 sets of trials apart as y"):
+        ActionModel().fit(X, condition, groups=condition)
