@@ -120,11 +120,11 @@ def test_dissimilarity_of_equal_still_opposite_and_distant_trials():
 def test_upper_limit_of_few_values_has_its_nominal_coverage(n, coverage):
     """Exactly so where variances differ between actions as three values tell them."""
     rng = np.random.default_rng(0)
-    spread = np.sqrt(3 * 0.07 / rng.chisquare(3, (4000, 1)))
-    logs = spread * rng.standard_normal((4000, n + 1))
+    spread = np.sqrt(3 * 0.07 / rng.chisquare(3, (6000, 1)))
+    logs = spread * rng.standard_normal((6000, n + 1))
     limits = [log_moments(np.exp(x[:-1])).upper_limit(coverage) for x in logs]
     held = [x[-1] <= np.log(limit) for x, limit in zip(logs, limits, strict=True)]
-    assert abs(np.mean(held) - coverage) < 0.015
+    assert abs(np.mean(held) - coverage) < 0.01
 
 
 # -- alone or together ------------------------------------------------------------------
