@@ -203,3 +203,15 @@ def test_old_names_tell_the_new_ones(name, now):
     assert not hasattr(sklearn_motionsync, name)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         sklearn_motionsync.nothing  # noqa: B018
+
+
+def test_the_old_name_of_a_data_set_tells_the_new_one():
+    datasets, message = (
+        ROOMS["datasets"],
+        r"datasets.load_performances is .*datasets.load_trials now",
+    )
+    with pytest.raises(ImportError, match=message):
+        exec("from sklearn_motionsync.datasets import load_performances")
+    with pytest.raises(AttributeError, match=message):
+        datasets.load_performances  # noqa: B018
+    assert not hasattr(datasets, "load_trial")
