@@ -190,9 +190,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             refuse_classes_as_people(encode_groups(y, len(trials), name="y")[0], codes)
         if groups is not None and codes.max() == 1 and len(trials) >= _MANY_OF_TWO:
             warnings.warn(
-                f"groups names two people for {len(trials)} trials: how people vary is learnt from "
-                "two, so that hardly anything is refused. If groups are conditions, give the "
-                "person of each trial instead.",
+                f"groups names two people for {counted(len(trials), 'trial')}: how people vary is "
+                "learnt from two, so that hardly anything is refused. If groups are conditions, "
+                "give the person of each trial instead.",
                 SynchronizationWarning,
                 stacklevel=3,
             )
