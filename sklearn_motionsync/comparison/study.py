@@ -115,7 +115,7 @@ class Study:
             raise ValueError(f"At least two people a group are needed, got {of}.")
         columns = (of_units[:, np.newaxis] == np.arange(1, len(labels))).astype(float)
         listed = f"{', '.join(labels[:-1])} and {labels[-1]}"
-        words = f"{listed}, {_count_units(len(of_units), groups is not None)}"
+        words = f"{listed}, {_count_units(len(of_units), n, groups is not None)}"
         design = Design(columns - columns.mean(axis=0))
         return cls(design, maker, of_units, None, labels, words)
 
@@ -149,7 +149,7 @@ class Study:
         if np.abs(within).max() <= _ROUNDING * np.ptp(covariate):
             _check_units(len(maker))
             design = Design((of_units - of_units.mean())[:, np.newaxis])
-            words = f"Regression, {_count_units(len(maker), named)}"
+            words = f"Regression, {_count_units(len(maker), len(covariate), named)}"
             return cls(design, maker, None, of_units, [], words)
         squares = np.bincount(persons, within**2)
         slopes = np.where(persons == np.arange(len(maker))[:, np.newaxis], within, 0)
@@ -324,9 +324,11 @@ def _firsts(persons):
     return np.unique(persons, return_index=True)[1]
 
 
-def _count_units(n, named):
+def _count_units(n, n_trials, named):
     """What differs: people, or trials of which each counts as a person."""
-    return counted(n, "trial") if not named else "1 person" if n == 1 else f"{n} people"
+    if not named:
+        return counted(n, "trial")
+    return f"{n} people" + (" of one trial each" if n == n_trials else "")
 
 
 def _refuse_measures(y):

@@ -455,3 +455,14 @@ def test_too_few_people_are_told_so():
         found = compare_groups(sync, X, ["a", "b"] * n, **given)
         assert f": {words}" in found.describe()
         assert found.smallest_p == 2 / 2**n
+
+
+def test_people_of_one_trial_each_are_told():
+    gait = make_gait(8, 2, random_state=0)
+    sync = LinearSynchronizer(20).fit(gait.data)
+    given = {"y": gait.group, "n_permutations": 19}
+    of_trials = compare_groups(sync, gait.data, groups=range(len(gait.data)), **given)
+    assert "A and B, 16 people of one trial each: " in of_trials.describe()
+    assert "A and B, 16 trials: " in compare_groups(sync, gait.data, **given).describe()
+    of_people = compare_groups(sync, gait.data, groups=gait.person, **given)
+    assert "A and B, 8 people: " in of_people.describe()
