@@ -13,7 +13,6 @@
 """
 
 from importlib import import_module
-from inspect import currentframe
 
 from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
@@ -30,6 +29,7 @@ from .synchronizers.parts import PartSynchronizer
 from .synchronizers.timing import TimingChannel
 from .transformers.aspace import ASpace
 from .transformers.framewise import FrameWise
+from .utils.parameters import error_of_old_name
 
 __all__ = [
     "ASpace",
@@ -124,8 +124,5 @@ def __getattr__(name):
     if name in _ROOMS:
         return import_module(f".{name}", __name__)
     if name in _NOW:
-        # An import says what is wrong only if this is no AttributeError, which hasattr needs.
-        is_import = currentframe().f_back.f_code.co_name == "_handle_fromlist"
-        error = ImportError if is_import else AttributeError
-        raise error(f"sklearn_motionsync.{name} is sklearn_motionsync.{_NOW[name]} now.")
+        raise error_of_old_name(f"{__name__}.{name}", f"{__name__}.{_NOW[name]}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,12 +1,13 @@
-"""scikit-learn's checks of parameters, as decorators that keep the type of what they decorate."""
+"""scikit-learn's checks of parameters as decorators, and what old names of the package say."""
 
 from collections.abc import Callable
+from inspect import currentframe
 from typing import Any, TypeVar, cast
 
 from sklearn.base import _fit_context
 from sklearn.utils._param_validation import validate_params
 
-__all__ = ["validated", "validated_function", "validated_with_nested"]
+__all__ = ["error_of_old_name", "validated", "validated_function", "validated_with_nested"]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -30,3 +31,14 @@ def validated_function(constraints: dict[str, list]) -> Callable[[_Function], _F
         As in ``_parameter_constraints`` of an estimator.
     """
     return validate_params(constraints, prefer_skip_nested_validation=True)
+
+
+def error_of_old_name(old, new):
+    """The error of a module's ``__getattr__`` for a name that has moved.
+
+    ``hasattr`` needs an AttributeError; an import would not show its message, and gets an
+    ImportError.
+    """
+    asked_by = currentframe().f_back.f_back.f_code.co_name
+    error = ImportError if asked_by == "_handle_fromlist" else AttributeError
+    return error(f"{old} is {new} now.")
