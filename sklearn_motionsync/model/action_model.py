@@ -42,7 +42,7 @@ __all__ = ["ActionModel"]
 # Smallest variance of a density, as a share of the variance of all the data: a deviation in a
 # constant feature is not infinitely improbable.
 _VARIANCE_FLOOR = 1e-9
-# Two people can have fewer trials than these.
+# From so many trials on two groups are told to be few, as they may be conditions.
 _MANY_OF_TWO = 20
 
 
@@ -191,8 +191,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         if groups is not None and codes.max() == 1 and len(trials) >= _MANY_OF_TWO:
             warnings.warn(
                 f"groups names two people for {counted(len(trials), 'trial')}: how people vary is "
-                "learnt from two, so that hardly anything is refused. If groups are conditions, "
-                "give the person of each trial instead.",
+                "learnt from two, which makes borders wide. If groups are conditions, give the "
+                "person of each trial instead.",
                 SynchronizationWarning,
                 stacklevel=3,
             )
