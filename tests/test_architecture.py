@@ -17,7 +17,8 @@ PACKAGE = ROOT / "sklearn_motionsync"
 # Lowest first: a subpackage imports from itself and from the floors below.
 FLOORS = [
     {"matching"},
-    {"inputs", "utils"},
+    {"inputs"},
+    {"utils"},
     {"body", "metrics", "transformers"},
     {"gait", "io", "synchronizers"},
     {"datasets", "model", "live"},

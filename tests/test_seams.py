@@ -1,120 +1,438 @@
-"""Functions that take a synchronizer and its arguments find what ``match`` finds with them."""
+"""Laws of all public functions that take an estimator and trials.
+
+A function has a row in `CALLS`, which gives what it finds, and each law changes what it is given in
+a way that must not change what it finds. A public function without a row fails.
+"""
 
 import inspect
+import io
 import json
 import re
+from collections import Counter
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import pytest
+from joblib import parallel_config
+from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionModel, DenseSynchronizer, PartSynchronizer, display
+from sklearn_motionsync import (
+    ActionDetector,
+    ActionModel,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    Match,
+    PartSynchronizer,
+    TimingChannel,
+    display,
+    to_frame,
+    to_trials,
+)
 from sklearn_motionsync.comparison import compare_events, compare_groups, compare_to_norm
-from sklearn_motionsync.datasets import make_gait
-from sklearn_motionsync.report import write_report
+from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.live import OnlineSynchronizer
+from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
+from sklearn_motionsync.model import find_departures
+from sklearn_motionsync.report import write_player, write_report
+from sklearn_motionsync.synchronizers import blend_trials
 
 from public import functions
 
+BENDS = make_bending(12, n_frames=60, n_actors=6, random_state=0)
+# A forearm of trial 3 is turned.
+BENDS.data[3][20:40, 3 * BENDS.skeleton.index_of("right_wrist")] += 0.2
+K = BENDS.keyframes[:, :2].astype(float)
 GAIT = make_gait(8, timing=5, n_frames=60, random_state=0)
-X, GROUP, PERSON = GAIT.data, GAIT.group, GAIT.person
-K = GAIT.keyframes[:, 3:4]
+EVENTS = GAIT.keyframes[:, 3:4]
+
+
+class Study(NamedTuple):
+    """What functions are given."""
+
+    sync: object
+    model: object
+    detector: object
+    X: list
+    y: list
+    groups: list
+    params: dict
+    path: object
+    trial: int = 3
+    norm: object = "early"
+
+    def fitted(self, estimator):
+        """A clone of an estimator that takes key-frames, fitted on the cosines of these trials."""
+        return clone(estimator).fit(cosines(self), **self.params)
+
+
+def part(study):
+    """A pipeline for lags."""
+    steps = DirectionCosines(BENDS.skeleton), PartSynchronizer(synchronizer=DenseSynchronizer(31))
+    return make_pipeline(*steps).fit(study.X)
+
+
+def cosines(study):
+    """What reaches the synchronizer, with the labels of the trials."""
+    out = DirectionCosines(BENDS.skeleton).fit_transform(study.X)
+    names = [x.attrs.get("label") for x in study.X if isinstance(x, pd.DataFrame)]
+    return to_trials(to_frame(out, trials=study.X)) if names else out
+
+
+def data_of(path):
+    """The data of a page."""
+    text = path.read_text(encoding="utf-8")
+    return json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
+
+
+def timing_of(s):
+    """The offsets that a report offers."""
+    path = write_report(s.path / "report.html", s.sync, s.X, unit="frames", **s.params)
+    table = pd.read_csv(io.StringIO(data_of(path)["files"]["timing.csv"]))
+    return table["offset (frames)"].to_numpy().reshape(len(s.X), -1)
+
+
+def marks_of(s):
+    """The key-frames of a player, as shares of each trial."""
+    path = write_player(s.path / "player.html", s.X, BENDS.skeleton, **s.params)
+    return np.array([mark["own"] for mark in data_of(path)["player"]["keyframes"]]).T
+
+
+def blended(s):
+    """A mean performance, seen from its first joint."""
+    weights = np.full(len(s.X), 1 / len(s.X))
+    path = blend_trials(s.sync, s.X, weights, skeleton=BENDS.skeleton, **s.params)
+    positions = np.asarray(path).reshape(len(path), -1, 3)
+    return positions - positions[:1, :1]
+
+
+def verdicts(s):
+    """What differs from a norm."""
+    people = {"norm": s.norm, "groups": s.groups, "unit": "frames"}
+    return compare_to_norm(s.sync, s.X, s.y, **people, **s.params).verdicts
+
+
+# What each function finds. Of those in BY_TRIAL the rows, or the first axis, are trials.
+CALLS = {
+    "ActionDetector.fit": lambda s: (
+        clone(s.detector)
+        .fit(s.X, groups=s.groups, **{f"densesynchronizer__{k}": v for k, v in s.params.items()})
+        .offset_
+    ),
+    "ActionDetector.decision_function": lambda s: s.detector.decision_function(s.X, **s.params),
+    "ActionDetector.predict": lambda s: s.detector.predict(s.X, **s.params),
+    "ActionDetector.report": lambda s: s.detector.report(s.X, **s.params).drop(columns="reason"),
+    "ActionDetector.score_samples": lambda s: s.detector.score_samples(s.X, **s.params),
+    "ActionModelDisplay.from_estimator": lambda s: (
+        display.ActionModelDisplay.from_estimator(s.model, s.X, **s.params).trials
+    ),
+    "DenseSynchronizer.calibrate": lambda s: (
+        clone(s.sync[1])
+        .fit(cosines(s), **s.params)
+        .calibrate(cosines(s), **s.params)
+        .interval_factor_
+    ),
+    "DenseSynchronizer.disparity_space": lambda s: (
+        s.sync[1].disparity_space(cosines(s), s.trial, **s.params).costs
+    ),
+    "DenseSynchronizer.fit": lambda s: s.fitted(DenseSynchronizer(31)).pattern_,
+    "DenseSynchronizer.fit_transform": lambda s: DenseSynchronizer(31).fit_transform(
+        cosines(s), **s.params
+    ),
+    "DenseSynchronizer.match": lambda s: s.sync[1].match(cosines(s), **s.params).times,
+    "DenseSynchronizer.transform": lambda s: s.sync[1].transform(cosines(s), **s.params),
+    "FeatureHoldoutScorer": lambda s: FeatureHoldoutScorer()(s.sync, s.X, **s.params),
+    "GroupDisplay.from_estimator": lambda s: (
+        display.GroupDisplay.from_estimator(s.sync, s.X, s.y, groups=s.groups, **s.params).events
+    ),
+    "LagDisplay.from_estimator": lambda s: (
+        display.LagDisplay.from_estimator(part(s), s.X).lags.values
+    ),
+    "LinearSynchronizer.fit": lambda s: s.fitted(LinearSynchronizer(31)).keyframes_,
+    "LinearSynchronizer.fit_transform": lambda s: LinearSynchronizer(31).fit_transform(
+        cosines(s), **s.params
+    ),
+    "LinearSynchronizer.match": lambda s: (
+        s.fitted(LinearSynchronizer(31)).match(cosines(s), **s.params).times
+    ),
+    "LinearSynchronizer.transform": lambda s: s.fitted(LinearSynchronizer(31)).transform(
+        cosines(s), **s.params
+    ),
+    "Match.from_estimator": lambda s: Match.from_estimator(s.sync, s.X, **s.params).times,
+    "OnlineSynchronizer.fit": lambda s: (
+        OnlineSynchronizer(DenseSynchronizer(31))
+        .fit(cosines(s), keyframes=s.params["keyframes"])
+        .mean_
+    ),
+    "PartSynchronizer.fit": lambda s: s.fitted(PARTS).keyframes_,
+    "PartSynchronizer.fit_transform": lambda s: clone(PARTS).fit_transform(cosines(s), **s.params),
+    "PartSynchronizer.lags": lambda s: part(s)[1].lags(cosines(s)).values,
+    "PartSynchronizer.match": lambda s: s.fitted(PARTS).match(cosines(s), **s.params).times,
+    "PartSynchronizer.match_parts": lambda s: (
+        s.fitted(PARTS).match_parts(cosines(s), **s.params)["foot"].times
+    ),
+    "PartSynchronizer.transform": lambda s: s.fitted(PARTS).transform(cosines(s), **s.params),
+    "SkeletonDisplay.from_departures": lambda s: display.SkeletonDisplay.from_departures(
+        s.model, s.X, trial=s.trial, **s.params
+    ).titles[1:],
+    "SkeletonDisplay.from_estimator": lambda s: np.array(
+        display.SkeletonDisplay.from_estimator(s.sync, s.X, trials=[s.trial], **s.params).scenes[-1]
+    ),
+    "SpreadScorer": lambda s: SpreadScorer()(s.sync, s.X, **s.params),
+    "SynchronizationDisplay.from_estimator": lambda s: (
+        display.SynchronizationDisplay.from_estimator(s.sync, s.X, **s.params).times
+    ),
+    "TimingChannel.fit": lambda s: s.fitted(TIMING).synchronizer_.pattern_,
+    "TimingChannel.fit_transform": lambda s: clone(TIMING).fit_transform(cosines(s), **s.params),
+    "TimingChannel.match": lambda s: s.fitted(TIMING).match(cosines(s), **s.params).times,
+    "TimingChannel.transform": lambda s: s.fitted(TIMING).transform(cosines(s), **s.params),
+    "TrellisDisplay.from_estimator": lambda s: (
+        display.TrellisDisplay.from_estimator(s.sync, s.X, trial=s.trial, **s.params).warp
+    ),
+    "blend_trials": blended,
+    "compare_groups": lambda s: compare_groups(
+        s.sync, s.X, s.y, groups=s.groups, n_permutations=99, **s.params
+    ).to_frame(),
+    "compare_to_norm": lambda s: (
+        verdicts(s)[["p", "p_shape", "p_timing"]].sort_values("p").to_numpy()
+    ),
+    "find_departures": lambda s: (
+        find_departures(s.model, s.X, **s.params)[["kind", "limb", "first", "last", "size"]]
+        .sort_values(["limb", "first"])
+        .reset_index(drop=True)
+    ),
+    "write_player": marks_of,
+    "write_report": timing_of,
+}
+PARTS = PartSynchronizer({"foot": [0, 1]}, synchronizer=DenseSynchronizer(31))
+TIMING = TimingChannel(DenseSynchronizer(31))
+
+
+# Lags are of the whole body, on which key-frames have no influence.
+WITHOUT_KEYFRAMES = {"LagDisplay.from_estimator", "PartSynchronizer.lags"}
+# The first axis, or the rows, of what they find are trials.
+BY_TRIAL = {
+    *(name for name in CALLS if name.endswith((".match", "transform", "match_parts", "lags"))),
+    *(name for name in CALLS if name.startswith("ActionDetector")),
+    "ActionModelDisplay.from_estimator",
+    "LagDisplay.from_estimator",
+    "Match.from_estimator",
+    "SynchronizationDisplay.from_estimator",
+    "write_player",
+    "write_report",
+} - {"ActionDetector.fit"}
+# Those whose estimator may be a Match, by the annotation of their signature.
+OF_MATCH = {
+    "GroupDisplay.from_estimator",
+    "SynchronizationDisplay.from_estimator",
+    "blend_trials",
+    "compare_groups",
+    "compare_to_norm",
+    "write_report",
+}
+# They take recordings that are no trials, or what was found before.
+OTHERS = {
+    "CycleDisplay.from_estimator",
+    "PhaseDisplay.from_estimator",
+    "SearchDisplay.from_estimator",
+    "TrackingDisplay.from_estimator",
+    "keyframe_error",
+}
+
+
+def test_every_function_has_its_row():
+    names, of_match = set(), set()
+    for name, function in functions():
+        if inspect.isclass(function) or not hasattr(function, "__annotations__"):
+            continue
+        parameters = inspect.signature(function).parameters
+        takes_trials = "X" in parameters and bool({"estimator", "params"} & set(parameters))
+        if takes_trials or "keyframes" in parameters:
+            names.add(name)
+        if "estimator" in parameters and "Match" in str(parameters["estimator"].annotation):
+            of_match.add(name)
+    assert names == (set(CALLS) - {n for n in CALLS if n.endswith(("Scorer", ".lags"))}) | OTHERS
+    assert of_match == OF_MATCH
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    X, groups = BENDS.data, BENDS.actor.tolist()
+    y = ["early" if person in ("actor0", "actor2", "actor4") else "late" for person in groups]
+    steps = DirectionCosines(BENDS.skeleton), DenseSynchronizer(31)
+    sync = make_pipeline(*steps).fit(X, densesynchronizer__keyframes=K)
+    model = make_pipeline(*steps, ActionModel())
+    names = {"densesynchronizer__keyframes": K}
+    detector = ActionDetector(model).fit(X, groups=groups, **names)
+    model.fit(X, actionmodel__groups=groups, **names)
+    params, path = {"keyframes": K}, tmp_path_factory.mktemp("laws")
+    return Study(sync, model, detector, X, y, groups, params, path)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_is_drawn():
+    """Laws are of what is found; figures are drawn in the tests of displays."""
+    with pytest.MonkeyPatch.context() as patch:
+        for kind in (getattr(display, name) for name in display.__all__):
+            patch.setattr(kind, "plot", lambda self, *args, **kwargs: self)
+        for name in ("draw_signals", "draw_offsets", "picture"):
+            patch.setattr(f"sklearn_motionsync.report.report.{name}", lambda *args: "")
+        yield
+
+
+@pytest.fixture(scope="module")
+def found(study):
+    """What a function finds in the study, once for all laws."""
+    known = {}
+
+    def of(name):
+        if name not in known:
+            known[name] = CALLS[name](study)
+        return known[name]
+
+    return of
+
+
+def seconds(study, rate):
+    return study._replace(params={"keyframes": K / rate[:, np.newaxis], "frame_rate": rate})
+
+
+def labelled(study):
+    """Trials with labels, and a table of the key-frames of more trials in another order."""
+    names = [f"trial{i}" for i in range(len(K))]
+    tables = to_trials(to_frame(study.X, trials=names))
+    table = pd.DataFrame(np.vstack([K, K[:2]]), index=[*names, "x", "y"]).iloc[::-1]
+    return study._replace(X=list(tables), params={"keyframes": table})
+
+
+ORDER = np.array([7, 2, 5, 11, 0, 3, 9, 1, 10, 4, 8, 6])
+
+
+def rearranged(study):
+    X, y, groups = ([values[i] for i in ORDER] for values in (study.X, study.y, study.groups))
+    trial = ORDER.tolist().index(study.trial)
+    return study._replace(X=X, y=y, groups=groups, params={"keyframes": K[ORDER]}, trial=trial)
+
+
+def renamed(study):
+    y = [{"early": 2, "late": 1}[label] for label in study.y]
+    return study._replace(y=y, groups=[9 - int(person[-1]) for person in study.groups], norm=2)
+
+
+LAWS = {
+    "seconds": lambda s: seconds(s, np.array([12.0, 25.0, 100.0] * 4)),
+    "table": lambda s: s._replace(params={"keyframes": pd.DataFrame(K)}),
+    "labels": labelled,
+    "order": rearranged,
+    "names": renamed,
+    "units": lambda s: s._replace(X=[1000 * x for x in s.X]),
+    "place": lambda s: s._replace(X=[x + np.tile([3.0, 0.0, -2.0], 15) for x in s.X]),
+    "match": lambda s: s._replace(sync=Match.from_estimator(s.sync, s.X, **s.params), params={}),
+    "jobs": lambda s: s,
+    "again": lambda s: s,
+}
+
+
+def holds_for(law):
+    """The functions for which a law is tried.
+
+    A live synchronizer has one frame rate. What scikit-learn's pipelines and the refits of a scorer
+    hand on has no labels.
+    """
+    if law == "seconds":
+        return set(CALLS) - WITHOUT_KEYFRAMES - {"OnlineSynchronizer.fit"}
+    if law == "labels":
+        return set(CALLS) - WITHOUT_KEYFRAMES - {"ActionDetector.fit", "FeatureHoldoutScorer"}
+    if law == "match":
+        return OF_MATCH
+    if law == "names":
+        return {name for name in CALLS if "groups" in inspect.getsource(CALLS[name])}
+    return set(CALLS)
+
+
+@pytest.mark.parametrize(
+    ("law", "name"), [(law, name) for law in LAWS for name in sorted(holds_for(law))]
+)
+def test_law(law, name, study, found):
+    changed = LAWS[law](study)
+    with parallel_config("threading", n_jobs=2 if law == "jobs" else 1):
+        other = CALLS[name](changed)
+    expected, tolerance = found(name), 0 if law in ("jobs", "again") else 1e-6
+    if law == "order" and name in BY_TRIAL:
+        expected = expected.iloc[ORDER] if isinstance(expected, pd.DataFrame) else expected[ORDER]
+    if law == "units" and name in ("blend_trials", "SkeletonDisplay.from_estimator"):
+        expected = 1000 * expected
+    if isinstance(expected, pd.DataFrame):
+        expected = expected.reset_index(drop=True)
+        other = other.reset_index(drop=True)
+        pd.testing.assert_frame_equal(other, expected, rtol=tolerance, atol=tolerance)
+    elif isinstance(expected, list):
+        assert other == expected
+    else:
+        np.testing.assert_allclose(other, expected, rtol=tolerance, atol=tolerance)
+
+
+@pytest.mark.parametrize("name", sorted(CALLS))
+def test_a_trial_is_matched_once(name, study, monkeypatch):
+    matches = Counter()
+    for kind in (DenseSynchronizer, LinearSynchronizer):
+        match_of = kind._match
+
+        def counted(self, trials, *args, match_of=match_of, **kwargs):
+            matches.update((x.shape, np.nansum(x)) for x in trials)
+            return match_of(self, trials, *args, **kwargs)
+
+        monkeypatch.setattr(kind, "_match", counted)
+    CALLS[name](study)
+    # A detector fits its pipeline, which hands on no match, and then matches what it learns from.
+    most = 2 if name == "ActionDetector.fit" else 1
+    assert max(matches.values(), default=0) <= most
 
 
 @pytest.fixture(scope="module")
 def sync():
-    return DenseSynchronizer(n_frames=51).fit(X, keyframes=K)
+    return DenseSynchronizer(n_frames=51).fit(GAIT.data, keyframes=EVENTS)
 
 
-@pytest.fixture(scope="module")
-def model(sync):
-    return make_pipeline(sync, ActionModel()).fit(X, densesynchronizer__keyframes=K)
-
-
-def report_of(estimator, trials, **params):
-    """The offsets of a report, as they are offered."""
-    path = write_report(params.pop("path"), estimator, trials, **params)
-    data = re.search(r'id="data">(.*?)</script>', path.read_text(encoding="utf-8"), re.DOTALL)
-    return json.loads(data[1])["files"]["timing.csv"]
-
-
-# What depends on the match, of every function that takes a synchronizer, its arguments, and a frame
-# rate of its own.
-FUNCTIONS = {
-    "compare_groups": lambda sync, _, path, **k: compare_groups(
-        sync, X, GROUP, groups=PERSON, n_permutations=49, random_state=0, unit="frames", **k
-    ).to_frame(),
-    "compare_to_norm": lambda sync, _, path, **k: (
-        compare_to_norm(sync, X, GROUP, norm="A", groups=PERSON, **k).verdicts
-    ),
-    "write_report": lambda sync, _, path, **k: report_of(sync, X, path=path, unit="frames", **k),
-    "ActionModelDisplay.from_estimator": lambda _, model, path, **k: (
-        display.ActionModelDisplay.from_estimator(model, X, **k).trials
-    ),
-    "GroupDisplay.from_estimator": lambda sync, _, path, **k: (
-        display.GroupDisplay.from_estimator(sync, X, GROUP, **k).offsets
-    ),
-    "SynchronizationDisplay.from_estimator": lambda sync, _, path, **k: (
-        display.SynchronizationDisplay.from_estimator(sync, X, **k).times
-    ),
-}
-# It refuses key-frames: see below.
-WITHOUT_KEYFRAMES = {"LagDisplay.from_estimator"}
-
-
-def test_every_function_has_its_row():
-    names = set()
-    for name, function in functions():
-        if inspect.isfunction(function) or inspect.ismethod(function):
-            parameters = inspect.signature(function).parameters
-            takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
-            if takes_any and "frame_rate" in parameters:
-                names.add(name)
-    assert names == set(FUNCTIONS) | WITHOUT_KEYFRAMES
-
-
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_seconds_are_frames(name, sync, model, tmp_path):
-    path = tmp_path / "report.html"
-    frames = FUNCTIONS[name](sync, model, path, keyframes=K)
-    seconds = FUNCTIONS[name](sync, model, path, keyframes=K / 12, frame_rate=12.0)
-    without = FUNCTIONS[name](sync, model, path)
-    if isinstance(frames, pd.DataFrame):
-        pd.testing.assert_frame_equal(seconds, frames)
-        assert not without.equals(frames)
-    elif isinstance(frames, str):
-        assert seconds == frames != without
-    else:
-        np.testing.assert_allclose(seconds, frames, rtol=0, atol=1e-9)
-        assert not np.allclose(without, frames)
+def test_a_live_synchronizer_takes_keyframes_in_its_seconds():
+    frames = OnlineSynchronizer(DenseSynchronizer(51)).fit(GAIT.data, keyframes=EVENTS)
+    live = OnlineSynchronizer(DenseSynchronizer(51), frame_rate=12.0)
+    live.fit(GAIT.data, keyframes=EVENTS / 12)
+    np.testing.assert_allclose(live.mean_, frames.mean_, rtol=1e-12)
 
 
 def test_lags_take_no_keyframes():
     """They are of the whole body, on which lags do not depend."""
-    sync = PartSynchronizer({"leg": [0, 1]}, synchronizer=DenseSynchronizer(51)).fit(X, keyframes=K)
+    sync = PartSynchronizer({"leg": [0, 1]}, synchronizer=DenseSynchronizer(51)).fit(
+        GAIT.data, keyframes=EVENTS
+    )
     with pytest.raises(TypeError, match=r"LagDisplay\.from_estimator got 'keyframes'"):
-        display.LagDisplay.from_estimator(sync, X, keyframes=K)
+        display.LagDisplay.from_estimator(sync, GAIT.data, keyframes=EVENTS)
 
 
 @pytest.mark.parametrize("method", ["fit", "match", "transform"])
 def test_a_table_in_another_order_is_refused(method, sync):
-    table = pd.DataFrame(K)
+    table = pd.DataFrame(EVENTS)
     np.testing.assert_array_equal(
-        sync.transform(X, keyframes=table), sync.transform(X, keyframes=K)
+        sync.transform(GAIT.data, keyframes=table), sync.transform(GAIT.data, keyframes=EVENTS)
     )
     with pytest.raises(ValueError, match=r"rows of keyframes are labelled .* in another order"):
-        getattr(sync, method)(X, keyframes=table.sort_values(0, ascending=False))
+        getattr(sync, method)(GAIT.data, keyframes=table.sort_values(0, ascending=False))
 
 
 @pytest.mark.parametrize("frame_rate", [True, -1, 0, np.nan, np.inf, "x", [100.0, -1.0]])
 def test_a_wrong_frame_rate_is_refused_where_it_does_not_matter(frame_rate, sync):
-    match = sync.match(X)
+    match = sync.match(GAIT.data)
     for call in (
-        lambda: sync.match(X, frame_rate=frame_rate),
-        lambda: DenseSynchronizer(51).fit(X, frame_rate=frame_rate),
+        lambda: sync.match(GAIT.data, frame_rate=frame_rate),
+        lambda: DenseSynchronizer(51).fit(GAIT.data, frame_rate=frame_rate),
         lambda: match.offsets_in("percent", frame_rate=frame_rate),
-        lambda: compare_groups(sync, X, GROUP, frame_rate=frame_rate),
-        lambda: compare_events(X, GAIT.keyframes, unit="percent", frame_rate=frame_rate),
-        lambda: display.SynchronizationDisplay.from_estimator(sync, X, frame_rate=frame_rate),
+        lambda: compare_groups(sync, GAIT.data, GAIT.group, frame_rate=frame_rate),
+        lambda: compare_events(GAIT.data, GAIT.keyframes, unit="percent", frame_rate=frame_rate),
+        lambda: display.SynchronizationDisplay.from_estimator(
+            sync, GAIT.data, frame_rate=frame_rate
+        ),
     ):
         with pytest.raises(
             ValueError, match=r"frame_rate (must be one number above 0|is not a numeric)"
@@ -124,7 +442,7 @@ def test_a_wrong_frame_rate_is_refused_where_it_does_not_matter(frame_rate, sync
 
 def test_a_keyframe_that_only_late_trials_know():
     """Where it is in the pattern is learnt from those that know it, as many as of any other."""
-    trials, keyframes = X * 2, np.full((2 * len(X), 2), np.nan)
+    trials, keyframes = GAIT.data * 2, np.full((2 * len(GAIT.data), 2), np.nan)
     keyframes[1:, 0] = np.tile(GAIT.keyframes[:, 0], 2)[1:]
     keyframes[-6:, 1] = GAIT.keyframes[-6:, 3]
     sync = DenseSynchronizer(51, pattern=0).fit(trials, keyframes=keyframes)

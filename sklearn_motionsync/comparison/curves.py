@@ -15,8 +15,8 @@ from ..inputs.numbers import check_finite
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..synchronizers.dense import DenseSynchronizer
-from ..synchronizers.match import Match, check_unit, match_of_times, rates_of
-from ..utils.pipelines import Routed, route_to_synchronizer, with_frame_rate
+from ..synchronizers.match import Match, check_unit, match_of_times
+from ..utils.pipelines import Routed, route_to_synchronizer
 
 __all__ = ["AlignedCurves"]
 
@@ -57,12 +57,12 @@ class AlignedCurves(NamedTuple):
     reached: Routed
 
     @classmethod
-    def of(cls, estimator, X, params, caller, *, signals, features, unit, frame_rate):
+    def of(cls, estimator, X, params, caller, *, signals, features, unit):
         """Match trials, and warp their signals.
 
         Parameters
         ----------
-        estimator : synchronizer, or Pipeline with one
+        estimator : synchronizer, Pipeline with one, or Match
             Fitted.
         X : trials, as the estimator takes them
         params : dict
@@ -76,24 +76,18 @@ class AlignedCurves(NamedTuple):
             Those of the signals; None for all.
         unit : {"frames", "percent", "seconds"}
             Of time.
-        frame_rate : float, array-like or None
-            As in `Match.offsets_in`; key-frames among the params are then seconds.
         """
         check_unit(unit)
-        params = with_frame_rate(params, frame_rate)
         reached = route_to_synchronizer(estimator, X, params, caller)
-        # As recorded: steps before the synchronizer may resample.
-        lengths = [len(x) for x in as_collection(X) or reached.trials]
-        rates = rates_of(X, frame_rate, unit)
         names, units, sequences = _signals(X, reached, signals, features)
-        match, n = reached.match(), len(lengths)
+        match, n = reached.match(), len(reached.trials)
         last = reached.synchronizer.n_frames_ - 1
-        offsets = match.offsets_in(unit, lengths, rates)
+        offsets = match.offsets_in(unit)
         clock = np.arange(last + 1.0)
         if unit == "percent":
             clock *= 100 / last
         elif unit == "seconds":
-            clock *= np.median((np.array(lengths) - 1) / rates) / last
+            clock *= np.median(reached.facts.durations()) / last
         even = match_of_times(np.tile(np.arange(last + 1.0), (n, 1)), n).warp(sequences)
         return cls(names, units, match.warp(sequences), even, offsets, clock, unit, match, reached)
 

@@ -8,7 +8,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
 from ..inputs.keyframes import Keyframes
-from ..inputs.resampling import as_frame_rates
+from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import (
     Labels,
     NumbersLike,
@@ -20,7 +20,7 @@ from ..inputs.types import (
 )
 from ..inputs.validation import SequenceLevelMixin, check_trials
 from ..io.events import is_table_of_events, keyframes_from_events
-from ..synchronizers.match import check_unit, rates_of
+from ..synchronizers.match import check_unit
 from ..utils.parallel import Progress
 from .study import GroupsOfPeople, Study, check_test, families
 
@@ -148,16 +148,13 @@ def _times_of_events(X, events, unit, frame_rate):
         events = keyframes_from_events(X, events, frame_rate=frame_rate)
     reader = type("compare_events", (SequenceLevelMixin, BaseEstimator), {})()
     trials = check_trials(reader, X, reset=True, level="sequence", finite="allow-nan")
-    n, last = len(trials), np.array([[len(x) - 1] for x in trials])
+    facts = TrialFacts.of(X, frame_rate, checked=trials)
+    n, last, scale = len(trials), facts.lengths[:, np.newaxis] - 1, 1.0
     frames = Keyframes(events, n, name="events").known(trials) * last
-    scale = np.ones((n, 1))
-    rates = rates_of(X, frame_rate, unit)
     if unit == "percent":
         scale = 100 / last
     elif unit == "seconds":
-        if rates is None:
-            raise ValueError("unit='seconds' needs frame_rate, frames a second of the trials.")
-        scale = 1 / np.broadcast_to(as_frame_rates(rates, n), (n, 1))
+        scale = 1 / facts.known_rates()[:, np.newaxis]
     names = events.columns if isinstance(events, pd.DataFrame) else range(frames.shape[1])
     return frames * scale, names
 

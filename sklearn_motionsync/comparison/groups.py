@@ -10,9 +10,9 @@ import pandas as pd
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
-from ..inputs.types import Features, Labels, RandomState, TrialsLike, Unit, ValuesLike
+from ..inputs.types import Features, Labels, RandomState, TrialsLike, Unit
 from ..matching.counting import first_largest, runs_of
-from ..synchronizers.match import UNITS
+from ..synchronizers.match import UNITS, Match
 from ..utils.parallel import Progress
 from .curves import AlignedCurves
 from .study import Study, check_test, families, share_at_most
@@ -125,7 +125,7 @@ class GroupComparison:
 
 
 def compare_groups(
-    estimator: BaseEstimator,
+    estimator: BaseEstimator | Match,
     X: TrialsLike,
     y: Labels,
     *,
@@ -137,7 +137,6 @@ def compare_groups(
     level: float = 0.05,
     n_permutations: int = 1999,
     unit: Unit = "percent",
-    frame_rate: float | ValuesLike | None = None,
     random_state: RandomState = 0,
     n_jobs: int | None = None,
     verbose: int = 0,
@@ -150,8 +149,9 @@ def compare_groups(
 
     Parameters
     ----------
-    estimator : synchronizer, or Pipeline with one
-        Fitted on the trials of all groups together, so that no group has a pattern of its own.
+    estimator : synchronizer, Pipeline with one, or Match of X
+        Fitted on the trials of all groups together, so that no group has a pattern of its own. A
+        `Match` is shared by the test, its figure and its report.
     X : trials
         As the estimator takes them.
     y : sequence of length n_sequences
@@ -176,9 +176,6 @@ def compare_groups(
         Number of random permutations, or of flips of signs if paired.
     unit : {"percent", "frames", "seconds"}, default="percent"
         Of places and offsets. In seconds the pattern lasts as long as the median trial.
-    frame_rate : float, or array-like of shape (n_sequences,), default=None
-        Frames a second of X, for seconds; by default what tables tell, as in `Match.offsets_in`.
-        Key-frames are then in seconds, as for ``match``.
     random_state : int, RandomState instance or None, default=0
         Draws the permutations.
     n_jobs : int, default=None
@@ -187,7 +184,8 @@ def compare_groups(
     verbose : int, default=0
         Above 0, print how far the permutations are, at most once a second.
     **params : dict
-        What synchronizing X takes besides, such as ``keyframes``.
+        What synchronizing X takes besides: ``frame_rate``, frames a second of X, which seconds need
+        where tables do not tell; ``keyframes``, which are seconds where a frame rate is given.
 
     Returns
     -------
@@ -240,7 +238,6 @@ def compare_groups(
         signals=signals,
         features=features,
         unit=unit,
-        frame_rate=frame_rate,
     )
     study = Study.of(y, groups, covariate=covariate, paired=paired, n=len(aligned.curves))
     return compare_aligned(aligned, study, level, n_permutations, random_state, n_jobs, verbose)

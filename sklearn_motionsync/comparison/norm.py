@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 
-from ..inputs.types import Features, Labels, TrialsLike, Unit, ValuesLike
+from ..inputs.types import Features, Labels, TrialsLike, Unit
 from ..inputs.wording import counted
 from ..matching.counting import first_largest, runs_of
 from ..model.acceptance import LogMoments
 from ..model.variation import predictive_variance
-from ..synchronizers.match import UNITS
+from ..synchronizers.match import UNITS, Match
 from ..utils.groups import encode_groups, refuse_classes_as_people
 from .curves import AlignedCurves
 from .study import check_level
@@ -134,7 +134,7 @@ class NormComparison:
 
 
 def compare_to_norm(
-    estimator: BaseEstimator,
+    estimator: BaseEstimator | Match,
     X: TrialsLike,
     y: Labels,
     *,
@@ -144,7 +144,6 @@ def compare_to_norm(
     features: Features | None = None,
     level: float = 0.05,
     unit: Unit = "percent",
-    frame_rate: float | ValuesLike | None = None,
     **params: Any,
 ) -> NormComparison:
     """Tell of single subjects whether they differ from a norm, in shape or in timing, and where.
@@ -154,7 +153,7 @@ def compare_to_norm(
 
     Parameters
     ----------
-    estimator : synchronizer, or Pipeline with one
+    estimator : synchronizer, Pipeline with one, or Match of X
         Fitted on the norm, or on all trials.
     X : trials
         Those of the norm and of the subjects, as the estimator takes them.
@@ -173,11 +172,9 @@ def compare_to_norm(
         Share of new people of the norm that are called different.
     unit : {"percent", "frames", "seconds"}, default="percent"
         Of places and offsets.
-    frame_rate : float, or array-like of shape (n_sequences,), default=None
-        Frames a second of X, for seconds; by default what tables tell. Key-frames are then in
-        seconds, as for ``match``.
     **params : dict
-        What synchronizing X takes besides, such as ``keyframes``.
+        What synchronizing X takes besides: ``frame_rate``, frames a second of X, which seconds need
+        where tables do not tell; ``keyframes``, which are seconds where a frame rate is given.
 
     Returns
     -------
@@ -230,7 +227,6 @@ def compare_to_norm(
         signals=signals,
         features=features,
         unit=unit,
-        frame_rate=frame_rate,
     )
     study = _Subjects.of(y, norm, groups, len(aligned.curves))
     return _compare(aligned, study, float(level))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from copy import copy
 from dataclasses import dataclass
 from numbers import Integral, Real
 
@@ -376,6 +377,12 @@ class Design:
         self.rows, self.flips = rows * np.sign(np.diagonal(triangle)), flips
         self.left = len(columns) - columns.shape[1] - (not flips)
 
+    def rearranged(self, order):
+        """The same of units in another order."""
+        design = copy(self)
+        design.rows = self.rows[order]
+        return design
+
     def permuted(self, random_state):
         """The rows after one random permutation."""
         n = len(self.rows)
@@ -500,6 +507,10 @@ def families(design, curves, n_permutations, random_state, *, n_jobs=None, progr
     -------
     list of Family
     """
+    # By their values, so that draws depend on neither the order of trials nor names of people.
+    sums = np.array([np.nansum(unit) for unit in curves[0]])
+    order = np.argsort(np.abs(sums) if design.flips else sums, kind="stable")
+    design, curves = design.rearranged(order), [values[order] for values in curves]
     draws = [design.rows, *(design.permuted(random_state) for _ in range(n_permutations))]
     portions = [np.stack(draws[k : k + _BATCH]) for k in range(0, len(draws), _BATCH)]
     units = [scaled(values, not design.flips) for values in curves]

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, Self, TypeAlias
 import numpy as np
 import pandas as pd
 
-from ..inputs.keyframes import Keyframes
-from ..inputs.resampling import as_frame_rates
 from ..synchronizers.match import UNITS, check_unit
 
 if TYPE_CHECKING:
@@ -34,7 +32,6 @@ __all__ = [
     "empty_lists",
     "front_line",
     "group_styles",
-    "keyframes_of_trials",
     "legend_above",
     "named_keyframes",
     "offset_label",
@@ -376,16 +373,15 @@ class TimeAxis:
     n_frames : int
         The length of the clock.
     lengths : sequence of int, default=None
-        The number of frames of each trial. None if unknown; ``frame_rate`` is then that of
-        the clock.
-    frame_rate : float, or array-like of shape (n_sequences,), default=None
-        Frames a second, for seconds only.
+        The number of frames of each trial, where trials are drawn.
+    durations : array-like, default=None
+        For seconds only: how long each trial lasts.
     label : str, default=None
         In place of the axis labels.
     keyframes : Series, default=None
         Key-frames on the clock, in frames, by name.
-    trial_keyframes : ndarray, shape (n_sequences, n_keyframes), default=None
-        Those of the trials in their frames, NaN where one is not known.
+    trial_keyframes : DataFrame, shape (n_sequences, n_keyframes), default=None
+        Those of the trials as shares of them, NaN where one is not known.
 
     Attributes
     ----------
@@ -402,7 +398,7 @@ class TimeAxis:
         unit,
         n_frames,
         lengths=None,
-        frame_rate=None,
+        durations=None,
         label=None,
         *,
         keyframes=None,
@@ -411,20 +407,18 @@ class TimeAxis:
         self.unit = check_unit(unit)
         self.label, self.trial_label = label or _CLOCK_LABELS[unit], label or _TRIAL_LABELS[unit]
         self.keyframes, self.trial_keyframes = keyframes, trial_keyframes
-        self.lengths, self.rates = lengths, None
+        self.lengths, self.durations = lengths, durations
         clock = np.arange(n_frames)
         self.clock = clock
         if unit == "percent":
             self.clock = 100 * clock / (n_frames - 1)
         if unit == "seconds":
-            self.rates = _frame_rates(frame_rate, lengths)
-            durations = (np.array(lengths or [n_frames]) - 1) / self.rates
             self.clock = np.median(durations) * clock / (n_frames - 1)
 
     @classmethod
-    def of_clock(cls, unit, clock, label=None):
+    def of_clock(cls, unit, clock, label=None, *, keyframes=None):
         """The axis of a clock whose frames have these times, in the unit."""
-        return cls(unit, len(clock), None, clock_rate(clock), label)
+        return cls(unit, len(clock), None, clock[-1:], label, keyframes=keyframes)
 
     def trials(self):
         """The times of the frames of each trial: list of ndarray (n_frames_i,)."""
@@ -435,7 +429,8 @@ class TimeAxis:
         if self.unit == "percent":
             return [100 * f / (n - 1) for f, n in zip(frames, self.lengths, strict=True)]
         if self.unit == "seconds":
-            return [f / rate for f, rate in zip(frames, self.rates, strict=True)]
+            known = zip(frames, self.durations, self.lengths, strict=True)
+            return [f * (lasting / (n - 1)) for f, lasting, n in known]
         return list(frames)
 
     def convert(self, frames):
@@ -445,7 +440,7 @@ class TimeAxis:
 
     def offsets_of(self, match, coverage=None):
         """The offsets of a match in the unit, and with a coverage the bounds of their intervals."""
-        offsets = match.offsets_in(self.unit, self.lengths, self.rates, coverage=coverage)
+        offsets = match.offsets_in(self.unit, coverage=coverage)
         return [offsets] if coverage is None else offsets
 
     def draw_keyframes(self, axes, named):
@@ -462,7 +457,8 @@ class TimeAxis:
         if self.trial_keyframes is None:
             return []
         segments, of_ticks = [], []
-        for i, row in enumerate(self.of_trials(self.trial_keyframes)):
+        lasts = np.array(self.lengths)[:, np.newaxis] - 1
+        for i, row in enumerate(self.of_trials(self.trial_keyframes.to_numpy() * lasts)):
             places = row[np.isfinite(row)]
             segments += [[(at, 0), (at, _TICK)] for at in places]
             of_ticks += [colors if isinstance(colors, str) else colors[i]] * len(places)
@@ -487,14 +483,6 @@ def offset_label(unit):
     return f"later than\nthe mean ({UNITS[unit]})"
 
 
-def _frame_rates(frame_rate, lengths):
-    """A frame rate for each trial; one for the clock without trials."""
-    count = 1 if lengths is None else len(lengths)
-    if frame_rate is None:
-        raise ValueError("unit='seconds' needs frame_rate, frames a second of the trials.")
-    return np.broadcast_to(as_frame_rates(frame_rate, count), (count, 1))[:, 0]
-
-
 # -- key-frames: lines on the clock, and ticks of each trial ---------------------------
 
 
@@ -516,16 +504,6 @@ def named_keyframes(synchronizer, keyframes):
         return None
     named = isinstance(keyframes, pd.DataFrame) and len(keyframes.columns) == len(frames)
     return pd.Series(frames, index=keyframes.columns if named else None)
-
-
-def keyframes_of_trials(synchronizer, trials, params):
-    """Key-frames (n_sequences, n_keyframes) of trials, in their frames, None if not given."""
-    keyframes, on_clock = params.get("keyframes"), getattr(synchronizer, "keyframes_", None)
-    if keyframes is None or on_clock is None:
-        return None
-    rows = Keyframes(keyframes, len(trials), params.get("frame_rate"))
-    last = np.array([[len(x) - 1] for x in trials])
-    return rows.shares(trials, len(on_clock)) * last
 
 
 def text_of_label(label):

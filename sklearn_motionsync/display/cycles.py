@@ -12,9 +12,10 @@ from sklearn.base import BaseEstimator
 from ..body.formats import SIDES
 from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features
+from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import TrialsLike, Unit
 from ..inputs.wording import counted
-from ..synchronizers.match import UNITS, rates_of
+from ..synchronizers.match import UNITS
 from ..takes.cycles import (
     CycleSegmenter,
     as_learnt,
@@ -159,7 +160,8 @@ class CycleDisplay(Display):
             whole = origin[origin["complete"]]
             cuts = np.unique([whole["start"], whole["stop"] - 1])
             cycles = counted(len(whole), "whole cycle")
-        rates = rates_of([recordings[i]], frame_rate, unit)
+        facts = TrialFacts.of([recordings[i]], frame_rate)
+        lasting = facts.durations() if unit == "seconds" else None
         (label,) = labels_of_signals([name], units_of_columns(recordings[i]), ylabel, units)
         period = f"period {longest.period:.1f} frames" if row["period"] > 0 else ""
         several = f"{len(row['stretches'])} stretches" if len(row["stretches"]) > 1 else ""
@@ -167,7 +169,7 @@ class CycleDisplay(Display):
         return cls(
             longest if row["period"] > 0 else longest._replace(period=np.nan),
             curve,
-            TimeAxis(unit, len(curve), [len(curve)], rates, xlabel),
+            TimeAxis(unit, len(curve), [len(curve)], lasting, xlabel),
             cuts,
             row["stretches"],
             float(required_strength(np.inf, longest.breadth, segmenter.threshold)),

@@ -16,10 +16,10 @@ from ..comparison.norm import NormComparison
 from ..comparison.study import GroupsOfPeople, band_of_mean
 from ..inputs.features import choose_features
 from ..inputs.keyframes import Keyframes
-from ..inputs.types import Features, Labels, NumbersLike, TrialsLike, Unit, ValuesLike
+from ..inputs.types import Features, Labels, NumbersLike, TrialsLike, Unit
 from ..inputs.wording import counted
 from ..matching.counting import first_largest
-from ..synchronizers.match import check_coverage
+from ..synchronizers.match import Match, check_coverage
 from .arguments import labels_of_signals
 from .base import (
     COLORS,
@@ -176,7 +176,7 @@ class GroupDisplay(Display):
     @classmethod
     def from_estimator(
         cls,
-        estimator: BaseEstimator,
+        estimator: BaseEstimator | Match,
         X: TrialsLike,
         y: Labels | None = None,
         *,
@@ -191,7 +191,6 @@ class GroupDisplay(Display):
         ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         unit: Unit = "percent",
-        frame_rate: float | ValuesLike | None = None,
         xlabel: str | None = None,
         ax: AxesLike | None = None,
         **params: Any,
@@ -200,7 +199,7 @@ class GroupDisplay(Display):
 
         Parameters
         ----------
-        estimator : synchronizer, or Pipeline with one
+        estimator : synchronizer, Pipeline with one, or Match of X
             Fitted on the trials of all groups together.
         X : trials
             As the estimator takes them.
@@ -236,15 +235,14 @@ class GroupDisplay(Display):
             names, and what tables tell in ``attrs["units"]``.
         unit : {"frames", "percent", "seconds"}, default="percent"
             Unit of time, as in `compare_groups`.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X, for seconds; by default what tables tell. Key-frames are then in
-            seconds, as for ``match``.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
+            Further arguments of the ``match`` of the synchronizer: ``frame_rate``, frames a second
+            of X, which seconds need where tables do not tell; ``keyframes``, which are seconds
+            where a frame rate is given.
 
         Returns
         -------
@@ -277,7 +275,6 @@ class GroupDisplay(Display):
             signals=signals,
             features=features,
             unit=unit,
-            frame_rate=frame_rate,
         )
         display = display_of_groups(
             aligned,
@@ -467,22 +464,21 @@ def display_of_groups(
 
 def _events_on_clock(events, aligned, of_people):
     """Where the events of people are on the clock, in frames: a table; None without events."""
-    rate, name = None, "events"
-    if events is None:
-        params = aligned.reached.params
-        events, rate, name = params.get("keyframes"), params.get("frame_rate"), "keyframes"
-    if events is None:
+    trials, shares = aligned.reached.trials, aligned.reached.keyframes
+    if events is not None:
+        known = Keyframes(events, len(trials), name="events").known(trials)
+        shares = pd.DataFrame(known, columns=getattr(events, "columns", None))
+    if shares is None:
         return None
-    trials = aligned.reached.trials
-    shares = Keyframes(events, len(trials), rate, name=name).known(trials)
     last = len(aligned.clock) - 1
     frames = np.arange(last + 1.0)
     places = np.array(
-        [np.interp(s * last, t, frames) for s, t in zip(shares, aligned.match.times, strict=True)]
+        [
+            np.interp(s * last, t, frames)
+            for s, t in zip(shares.to_numpy(), aligned.match.times, strict=True)
+        ]
     )
-    names = events.columns if isinstance(events, pd.DataFrame) else range(places.shape[1])
-    rows = of_people.means(places)
-    return pd.DataFrame(np.concatenate(rows), columns=pd.Index(names, tupleize_cols=False))
+    return pd.DataFrame(np.concatenate(of_people.means(places)), columns=shares.columns)
 
 
 @dataclass(eq=False, repr=False)

@@ -8,9 +8,8 @@ from typing import Any, Self
 import numpy as np
 from sklearn.base import BaseEstimator
 
-from ..inputs.types import Labels, TrialsLike, Unit, ValuesLike
+from ..inputs.types import Labels, TrialsLike, Unit
 from ..inputs.wording import counted
-from ..synchronizers.match import rates_of
 from ..synchronizers.parts import Lags, PartSynchronizer
 from ..utils.pipelines import route_to_synchronizer
 from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, curves, front_line, legend_above
@@ -80,7 +79,6 @@ class LagDisplay(Display):
         *,
         groups: Labels | None = None,
         unit: Unit = "percent",
-        frame_rate: float | ValuesLike | None = None,
         xlabel: str | None = None,
         ax: AxesLike | None = None,
         **params: Any,
@@ -97,15 +95,13 @@ class LagDisplay(Display):
             The subject of each trial.
         unit : {"frames", "percent", "seconds"}, default="percent"
             Unit of the lags.
-        frame_rate : float or array-like (n_sequences,), default=None
-            Frames a second of the trials, for seconds; by default what tables tell, as in
-            `Match.to_frame`.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            Further arguments of the steps before the synchronizer. Key-frames are of the whole
+            Further arguments of the steps before the synchronizer, and ``frame_rate``, frames a
+            second of X, which seconds need where tables do not tell. Key-frames are of the whole
             body, and lags do not depend on them.
 
         Returns
@@ -117,12 +113,8 @@ class LagDisplay(Display):
         reached = route_to_synchronizer(
             estimator, X, params, caller, kind=PartSynchronizer, uses=()
         )
-        lags = reached.synchronizer.lags(
-            reached.trials,
-            groups,
-            unit=unit,
-            frame_rate=rates_of(X, frame_rate, unit),
-        )
+        rates = reached.facts.frame_rates
+        lags = reached.synchronizer.lags(reached.trials, groups, unit=unit, frame_rate=rates)
         return cls(lags, xlabel=xlabel).plot(ax)
 
     @classmethod

@@ -9,14 +9,13 @@ from typing import Any, Literal, Self
 import numpy as np
 from sklearn.base import BaseEstimator
 
-from ..inputs.collections import as_collection
 from ..inputs.features import choose_features
-from ..inputs.types import Features, TrialsLike, Unit, ValuesLike
+from ..inputs.trial_facts import TrialFacts
+from ..inputs.types import Features, TrialsLike, Unit
 from ..inputs.wording import counted
 from ..model.action_model import ActionModel
 from ..model.views import view_of
-from ..synchronizers.match import rates_of
-from ..utils.pipelines import find_step, find_synchronizer, with_frame_rate
+from ..utils.pipelines import find_step, find_synchronizer
 from .arguments import labels_of_signals, undo_scaling
 from .base import (
     COLORS,
@@ -114,7 +113,6 @@ class ActionModelDisplay(Display):
         features: Features | None = None,
         band: Literal["points", "trials", "mean"] | None = None,
         unit: Unit = "frames",
-        frame_rate: float | ValuesLike | None = None,
         ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         xlabel: str | None = None,
@@ -144,10 +142,6 @@ class ActionModelDisplay(Display):
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames or per cent of the pattern, or seconds; the clock then lasts
             as long as the median trial of X.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X as recorded, for seconds, by default what tables tell, as in
-            `Match.to_frame`; without X those of the clock. Key-frames are then in seconds, as for
-            ``match``.
         ylabel, units : str, list of str or dict, default=None
             Labels of the features and their units: of all, one each, or by name. By default their
             names, and what tables tell in ``attrs["units"]``.
@@ -156,8 +150,10 @@ class ActionModelDisplay(Display):
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            Further arguments of the synchronizer, such as ``keyframes``, in frames: lines. The
-            columns of a table of key-frames are their names.
+            Further arguments of the synchronizer: ``frame_rate``, frames a second of X as recorded,
+            which seconds need where tables do not tell, without X those of the clock;
+            ``keyframes``, which are seconds where a frame rate is given: lines. The columns of a
+            table of key-frames are their names.
 
         Returns
         -------
@@ -181,30 +177,33 @@ class ActionModelDisplay(Display):
         if band not in list(_BAND_TITLES):
             raise ValueError(f"band must be one of {list(_BAND_TITLES)}, got {band!r}.")
         caller = f"{cls.__name__}.from_estimator"
-        if X is None and params:
-            raise TypeError(f"{caller} takes {', '.join(params)} along with trials X only.")
-        params = with_frame_rate(params, frame_rate)
+        beside = [name for name in params if name != "frame_rate"]
+        if X is None and beside:
+            raise TypeError(f"{caller} takes {', '.join(beside)} along with trials X only.")
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
         shown = view.whole if band == "trials" else view.synchronised
         lower, upper, what = _band_of(view, band)
         drawn: list = [view.model.mean_, lower, upper, *(() if shown is None else shown)]
-        n_frames, lengths, rates = len(view.model.mean_), None, frame_rate
+        n_frames = len(view.model.mean_)
         known_units: dict = {}
         if view.model is view.model_of_points:
             before, model = find_step(estimator, ActionModel)
             undo, known_units = undo_scaling(before, X, model.mean_.shape[1])
             drawn = [undo(x) for x in drawn]
         mean, lower, upper, *trials = (x[:, chosen] for x in drawn)
-        if unit == "seconds" and X is not None:
-            lengths, rates = _lengths(X), rates_of(X, frame_rate)
+        if view.curves is None:
+            facts = TrialFacts.of([n_frames], params.get("frame_rate"))
+        else:
+            facts = view.curves.facts
+        lasting = facts.durations() if unit == "seconds" else None
         keyframes = _keyframes_of(estimator, n_frames, params.get("keyframes"))
         return cls(
             mean,
             lower,
             upper,
             np.stack(trials) if trials else None,
-            TimeAxis(unit, n_frames, lengths, rates, xlabel, keyframes=keyframes),
+            TimeAxis(unit, n_frames, None, lasting, xlabel, keyframes=keyframes),
             labels_of_signals([view.names[i] for i in chosen], known_units, ylabel, units),
             (_BAND_TITLES[band].format(100 * view.model.coverage), what),
             X is not None and band != "mean",
@@ -292,15 +291,6 @@ def _keyframes_of(estimator, n_frames, keyframes):
         return None
     same = getattr(synchronizer, "n_frames_", None) == n_frames
     return named_keyframes(synchronizer, keyframes) if same else None
-
-
-def _lengths(X):
-    """The numbers of frames of trials, or of univariate rows."""
-    collection = as_collection(X)
-    if collection is None:
-        n_sequences, n_frames = np.shape(X)
-        return [n_frames] * n_sequences
-    return [len(x) for x in collection]
 
 
 def _band_of(view, band):

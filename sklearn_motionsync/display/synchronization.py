@@ -16,9 +16,9 @@ from ..inputs.numbers import check_finite, nanmean
 from ..inputs.types import Features, Labels, NumbersLike, TrialsLike, Unit, ValuesLike
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
-from ..synchronizers.match import Match, check_coverage, match_of_times, rates_of
+from ..synchronizers.match import Match, check_coverage, match_of_times
 from ..utils.groups import names_of_groups
-from ..utils.pipelines import index_of_pattern, route_to_synchronizer, with_frame_rate
+from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .arguments import labels_of_signals, undo_scaling
 from .base import (
     COLORS,
@@ -30,7 +30,6 @@ from .base import (
     empty_lists,
     front_line,
     group_styles,
-    keyframes_of_trials,
     legend_above,
     named_keyframes,
     offset_label,
@@ -123,13 +122,12 @@ class SynchronizationDisplay(Display):
     @classmethod
     def from_estimator(
         cls,
-        estimator: BaseEstimator,
+        estimator: BaseEstimator | Match,
         X: TrialsLike,
         *,
         features: Features | None = None,
         y: Labels | None = None,
         unit: Unit = "frames",
-        frame_rate: float | ValuesLike | None = None,
         ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         xlabel: str | None = None,
@@ -142,7 +140,7 @@ class SynchronizationDisplay(Display):
 
         Parameters
         ----------
-        estimator : synchronizer, or Pipeline with one
+        estimator : synchronizer, Pipeline with one, or Match of X
             Fitted.
         X : trials
             As the estimator takes them.
@@ -155,9 +153,6 @@ class SynchronizationDisplay(Display):
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames; per cent of a trial, and of the pattern; or seconds of
             the trials as recorded, and of the median trial on the clock.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X, for seconds; by default what tables tell, as in
-            `Match.to_frame`. Key-frames are then in seconds, as for ``match``.
         ylabel, units : str, list of str or dict, default=None
             Labels of the features and their units: of all, one each, or by name. By default their
             names, and what tables tell in ``attrs["units"]``.
@@ -173,9 +168,10 @@ class SynchronizationDisplay(Display):
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            Further arguments of the ``match`` of the synchronizer, such as ``keyframes``, in
-            frames: lines on the clock, and ticks of each trial. The columns of a table of
-            key-frames are their names.
+            Further arguments of the ``match`` of the synchronizer: ``frame_rate``, frames a second
+            of X, which seconds need where tables do not tell; ``keyframes``, which are seconds
+            where a frame rate is given: lines on the clock, and ticks of each trial. The columns of
+            a table of key-frames are their names.
 
         Returns
         -------
@@ -184,7 +180,6 @@ class SynchronizationDisplay(Display):
         """
         if coverage is not None:
             check_coverage(coverage)
-        params = with_frame_rate(params, frame_rate)
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         before, synchronizer, trials = reached[:3]
         width = trials[0].shape[1]
@@ -196,10 +191,10 @@ class SynchronizationDisplay(Display):
             unit,
             match.times.shape[1],
             [len(x) for x in shown],
-            rates_of(X, frame_rate, unit),
+            reached.facts.durations() if unit == "seconds" else None,
             xlabel,
-            keyframes=named_keyframes(synchronizer, params.get("keyframes")),
-            trial_keyframes=keyframes_of_trials(synchronizer, trials, params),
+            keyframes=named_keyframes(synchronizer, reached.params.get("keyframes")),
+            trial_keyframes=reached.keyframes,
         )
         index = index_of_pattern(synchronizer, trials)
         return cls(
@@ -246,8 +241,8 @@ class SynchronizationDisplay(Display):
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X, for seconds; by default what tables tell, as in
-            `Match.to_frame`.
+            Frames a second of X, for seconds; by default what tables tell, or the match, as in
+            `Match.offsets_in`.
         ylabel, units : str, list of str or dict, default=None
             Labels of the features and their units: of all, one each, or by name. By default their
             names, and what tables tell in ``attrs["units"]``.
@@ -282,12 +277,13 @@ class SynchronizationDisplay(Display):
         chosen = choose_features(features, names)
         shown = [x[:, chosen] for x in arrays]
         after, known_units = match.warp(shown), units_of_columns(as_collection(X)[0])
-        rates, lengths = rates_of(X, frame_rate, unit), [len(x) for x in shown]
+        facts, lengths = match.facts_of(X, frame_rate), [len(x) for x in shown]
+        lasting = facts.durations() if unit == "seconds" else None
         return cls(
             shown,
             after,
-            match,
-            TimeAxis(unit, after.shape[1], lengths, rates, xlabel),
+            match.of_trials(facts, match.reached),
+            TimeAxis(unit, after.shape[1], lengths, lasting, xlabel),
             labels_of_signals([names[i] for i in chosen], known_units, ylabel, units),
             nanmean(after, axis=0),
             ("as recorded", "their mean"),

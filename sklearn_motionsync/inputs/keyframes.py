@@ -1,5 +1,7 @@
 """Key-frames that are given: one row a trial, in frames or seconds, NaN for not known."""
 
+from collections import Counter
+
 import numpy as np
 import pandas as pd
 
@@ -17,27 +19,33 @@ class Keyframes:
     Parameters
     ----------
     keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame
-        One row a trial; None for one of which nothing is known.
+        One row a trial; None for one of which nothing is known. Rows of a table go by the labels of
+        the trials, if these have some.
     n_sequences : int
         Trials in the set.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames per second: key-frames are seconds.
     name : str, default="keyframes"
         The argument, for messages.
+    anywhere : bool, default=False
+        Whether they may be in any order, and the first or last frame of a trial: marks, by which
+        nothing is matched.
     """
 
-    def __init__(self, keyframes, n_sequences, frame_rate=None, *, name="keyframes"):
-        self._labels, self._name = None, name
+    def __init__(
+        self, keyframes, n_sequences, frame_rate=None, *, name="keyframes", anywhere=False
+    ):
+        self._labels, self._name, self._anywhere = None, name, anywhere
         if isinstance(keyframes, (pd.DataFrame, pd.Series)):
             # One row a trial; iterating would give columns.
             if not isinstance(keyframes.index, pd.RangeIndex):
                 self._labels = keyframes.index.to_list()
             keyframes = keyframes.to_numpy()
-        if not hasattr(keyframes, "__len__") or len(keyframes) != n_sequences:
-            raise ValueError(
-                f"{name} must be a list of {n_sequences} arrays (n_keyframes,), one a "
-                f"trial; got {keyframes!r:.200}."
-            )
+        self._count = n_sequences
+        if not hasattr(keyframes, "__len__") or (
+            self._labels is None and len(keyframes) != n_sequences
+        ):
+            self._refuse_count(keyframes)
         self._rows, self._rates = list(keyframes), None
         if frame_rate is not None:
             rates = as_frame_rates(frame_rate, n_sequences)
@@ -53,17 +61,17 @@ class Keyframes:
         count : int, default=None
             Key-frames of each; by default as many as the first has.
         """
-        numbers = range(len(self._rows))
-        if len(trials) < len(self._rows):
+        numbers = range(self._count)
+        if len(trials) < self._count:
             numbers = trials.numbers
-        self._check_labels([trials.labels[i] for i in range(len(trials))], numbers)
+        rows = self._rows_of([trials.labels[i] for i in range(len(trials))], numbers)
         if count is None:
             counts = [np.size(row) for row in self._rows if row is not None]
             count = counts[0] if counts else 0
         out = np.full((len(trials), count), np.nan)
-        for row, i, x in zip(out, numbers, trials, strict=True):
-            if self._rows[i] is not None:
-                row[:] = self._checked(i, len(x), count)
+        for shares, row, i, x in zip(out, rows, numbers, trials, strict=True):
+            if row is not None:
+                shares[:] = self._checked(row, i, len(x), count)
         return out
 
     def known(self, trials):
@@ -78,9 +86,8 @@ class Keyframes:
             )
         return out
 
-    def _checked(self, i, n_frames, count):
+    def _checked(self, row, i, n_frames, count):
         """The key-frames of one trial, as shares."""
-        row = self._rows[i]
         frames = as_numbers(row, f"Trial {i}: {self._name}", dtype=np.float64)
         known_frames = frames[~np.isnan(frames)] if frames.shape == (count,) else frames.ravel()
         if self._rates is not None:
@@ -88,35 +95,49 @@ class Keyframes:
         else:
             refuse_seconds(known_frames, n_frames, f"Trial {i}")
         path = np.concatenate([[0], known_frames, [n_frames - 1]])
-        if frames.shape != (count,) or count == 0 or not (np.diff(path) > 0).all():
+        is_inside = (np.diff(path) > 0).all()
+        kind, ends = "increasing frame", "excluded"
+        if self._anywhere:
+            is_inside = ((path >= 0) & (path <= n_frames - 1)).all()
+            kind, ends = "frame", "included"
+        if frames.shape != (count,) or count == 0 or not is_inside:
             unit = "" if self._rates is None else f" times {self._rates[i]:g} frames per second"
             raise ValueError(
                 f"Trial {i}: key-frames must be "
-                f"{counted(count, 'increasing frame') if count else 'some increasing frames'} "
-                f"between 0 and {n_frames - 1}, both excluded, NaN where one is not known, "
+                f"{counted(count, kind) if count else f'some {kind}s'} "
+                f"between 0 and {n_frames - 1}, both {ends}, NaN where one is not known, "
                 f"got {row}{unit}."
             )
         return frames / (n_frames - 1)
 
-    def _check_labels(self, labels, numbers):
-        """Refuse rows of a table that are labelled otherwise than the trials."""
-        if self._labels is None:
-            return
-        in_order = list(range(len(self._labels)))
-        if labels == list(numbers):
+    def _rows_of(self, labels, numbers):
+        """The rows of trials of these labels and numbers."""
+        if self._labels is None or labels == list(numbers):
             # Of trials without labels only their numbers tell another order.
-            if self._labels != in_order and set(self._labels) == set(in_order):
+            in_order = list(range(len(self._rows)))
+            if len(in_order) != self._count:
+                self._refuse_count(self._rows)
+            if self._labels not in (None, in_order) and set(self._labels) == set(in_order):
                 raise ValueError(
                     f"The rows of {self._name} are labelled {self._labels[:8]}: the numbers of the "
                     f"trials, in another order. Give {self._name}.sort_index(), or, if "
                     "they are in the order of the trials, "
                     f"{self._name}.reset_index(drop=True)."
                 )
-            return
-        for place, (label, i) in enumerate(zip(labels, numbers, strict=True)):
-            if self._labels[i] != label:
+            return [self._rows[i] for i in numbers]
+        counts = Counter(self._labels)
+        for place, label in enumerate(labels):
+            if counts[label] != 1:
                 raise ValueError(
-                    f"Trial {place} is labelled {label!r}, and its row of {self._name} "
-                    f"{self._labels[i]!r}. Give rows in the order of the trials: "
-                    f"{self._name}.loc[labels]."
+                    f"Trial {place} is labelled {label!r}, and {self._name} has "
+                    f"{counted(counts[label], 'row')} of this label: give one for each trial, or "
+                    f"{self._name}.to_numpy() in the order of the trials."
                 )
+        row_by_label = dict(zip(self._labels, self._rows, strict=True))
+        return [row_by_label[label] for label in labels]
+
+    def _refuse_count(self, keyframes):
+        raise ValueError(
+            f"{self._name} must be a list of {self._count} arrays (n_keyframes,), one a "
+            f"trial; got {keyframes!r:.200}."
+        )

@@ -24,7 +24,7 @@ from .numbers import (
     column_names,
     refuse_non_numeric,
 )
-from .tables import FRAME, INDEX_NAMES, SPLIT, TRIAL, as_pandas, labels_of, stack_frame
+from .tables import FRAME, SPLIT, TRIAL, as_pandas, labels_of, stack_frame
 from .types import Transformed, TrialsLike
 from .wording import counted
 
@@ -34,7 +34,6 @@ __all__ = [
     "check_transformed",
     "check_trials",
     "labels_of_input",
-    "labels_of_parts",
     "names_of_input",
     "read_collection",
     "read_source",
@@ -481,18 +480,3 @@ def _dtype_of_maps(source):
     if not kinds:
         return None
     return np.dtype(np.float32 if kinds == {np.dtype(np.float32)} else np.float64)
-
-
-def labels_of_parts(labels, levels, names):
-    """The labels of trials that were read in parts, if they differ, without the arrays.
-
-    Parameters
-    ----------
-    labels : list
-    levels : set of tuple
-        Those of the parts.
-    names : ndarray of str or None
-    """
-    if len(levels) > 1 or len(set(labels)) < len(labels):
-        labels, levels = list(range(len(labels))), {INDEX_NAMES}
-    return Trials((), "list", labels, names=names, levels=levels.pop())

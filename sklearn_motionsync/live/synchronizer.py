@@ -202,7 +202,8 @@ class OnlineSynchronizer(
         y : ignored
             Passed to the synchronizer.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each trial, passed to the synchronizer, which has to take them.
+            Key-frames of each trial, passed to the synchronizer, which has to take them. With a
+            ``frame_rate`` they are seconds.
 
         Returns
         -------
@@ -218,6 +219,8 @@ class OnlineSynchronizer(
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         trials = self._check_training_set(X)
         metadata: dict[str, Any] = {} if keyframes is None else {"keyframes": keyframes}
+        if metadata and self.frame_rate is not None:
+            metadata["frame_rate"] = self.frame_rate
         with self._progress(fits=True) as progress:
             with progress.fitting(sync, "synchronizing"):
                 sync.fit(X, y, **metadata)

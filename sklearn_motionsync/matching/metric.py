@@ -198,7 +198,10 @@ def metric_of_matches(match, positions, velocity):
     tuple (Metric, Evidence), or None
         None if no feature moves.
     """
-    moves = positions.any(axis=(0, 1)) & velocity.any(axis=(0, 1))
+    # What is constant but for rounding does not move, and must not count as a feature.
+    speeds = np.sqrt(np.square(velocity).sum(axis=(0, 1), dtype=np.float64))
+    least = max(ROUNDING, 16 * np.finfo(velocity.dtype).eps)
+    moves = positions.any(axis=(0, 1)) & (speeds > least * speeds.max(initial=0))
     if len(positions) < 2 or not moves.any():
         return None
     poses = without_mean(positions)

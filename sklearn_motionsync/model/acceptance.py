@@ -1,8 +1,9 @@
 """What new people are expected to do at most, by logarithms, and the tests of a detector."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import stdtr
 from scipy.stats import t as student
 
 from ..utils.groups import mean_of_others
@@ -134,7 +135,13 @@ def dissimilarity_tails(held_out, new=None):
     moments = log_moments(held_out)
     values = np.maximum(held_out if new is None else new, LEAST)
     deviations = moments.standardize(values, DISSIMILARITY_VARIANCE)
-    return student.logsf(deviations / np.sqrt(1 + 1 / moments.n), moments.n - 1 + _PRIOR_COUNT)
+    return _log_tail(deviations / np.sqrt(1 + 1 / moments.n), moments.n - 1 + _PRIOR_COUNT)
+
+
+def _log_tail(deviations, freedom):
+    """Logarithms of the probabilities of larger deviations, by Student's t distribution."""
+    with np.errstate(divide="ignore"):
+        return np.log(stdtr(freedom, -deviations))
 
 
 @dataclass(frozen=True)
@@ -155,27 +162,31 @@ class Acceptance:
         Share of new trials that are accepted.
     main : str, default="movement"
         The test with weight 1.
+
+    Attributes
+    ----------
+    limit : float
+        The largest score that is accepted, of those that are no ratio.
     """
 
     held_out: dict
     groups: np.ndarray
     coverage: float
     main: str = "movement"
+    limit: float = field(init=False)
 
     def scores(self, tails):
         """Scores in units of the limit: at most 1 is accepted."""
         return self._root(tails) / self.limit
 
-    @property
-    def limit(self):
-        """The largest score that is accepted, of those that are no ratio."""
+    def __post_init__(self):
         known = self._root(self.held_out)
         n, n_groups = len(known), len(np.unique(self.groups))
         squares = np.square(known - known.mean()).sum()
         reach = t_prediction_limit(n, squares, self.coverage, _SCORE_VARIANCE)
         # The error of the mean is that of so many people.
         reach *= np.sqrt((1 + 1 / n_groups) / (1 + 1 / n))
-        return float(known.mean() + reach)
+        object.__setattr__(self, "limit", float(known.mean() + reach))
 
     def shares(self, tails):
         """What each test adds to the squared score: (n, n_tests)."""
@@ -227,7 +238,7 @@ class LogPredictionInterval:
     def tails(self, deviations):
         """The logarithm of the probability of deviations on this scale as large to either side."""
         size = np.abs(self._end * deviations)
-        return student.logsf(size / self._error, self._freedom) + np.log(2)
+        return _log_tail(size / self._error, self._freedom) + np.log(2)
 
 
 class Contrast:

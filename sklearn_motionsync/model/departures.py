@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import partial
+from functools import cached_property, partial
 from numbers import Real
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,8 @@ from ..matching.counting import ROUNDING, first_largest, whole
 from ..matching.gaps import fill_with_mean
 from ..matching.warps import at_times
 from ..synchronizers.linear import LinearSynchronizer
-from ..utils.pipelines import find_synchronizer, route_to_synchronizer
+from ..utils.pipelines import find_step, find_synchronizer, flat_steps
+from .action_model import ActionModel
 from .faults import FaultFinder, Part, expected_trial
 from .views import View, limbs_of, models_of_classes, view_of
 
@@ -297,63 +299,125 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     -------
     Judged
     """
-    poses = features is None
-    view = view_of(estimator, X, params, caller, features=features, poses=poses)
-    n = len(view.labels)
+    expected = _Expected.of(estimator, features)
+    view = expected.view.of(X, params, caller)
+    n, match = len(view.labels), view.curves.match
     sought = range(n) if only is None else [only(n)]
-    names, chosen = view.names, np.arange(len(view.names))
-    if features is not None:
-        chosen = np.array(choose_features(features, names))
-    before, match = None, view.curves.match
-    with suppress(ValueError):
-        before = find_synchronizer(estimator)[0]
-        if match is None:
-            # The synchronizer stands before an aSpace.
-            match = route_to_synchronizer(estimator, X, params, caller).match()
-    limbs = limbs_of(before, names) if features is None else None
-    space = FaultSpace([names[i] for i in chosen], limbs)
-    training, groups = view.training[..., chosen].astype(np.float64), view.model.groups_
-    mean, std, of_person = view.model.mean_[:, chosen], view.predicted[:, chosen], None
+    mean, std, of_person, in_time = expected.mean, expected.std, None, None
     if reference is not None:
-        reference_view = view_of(estimator, reference, {}, caller, features=features, poses=poses)
-        of_person = fill_with_mean(reference_view.whole[..., chosen].astype(np.float64), mean)
-        mean, variance = expected_trial(training, groups, of_person)
-        std = np.sqrt(variance + view.residual_variance[chosen] * (1 + 1 / len(of_person)))
-    curves, left_out = view.whole[..., chosen], view.residual_variance[chosen]
-    filled = fill_with_mean(curves.astype(np.float64), mean)
-    linear, later = None, [None] * len(filled)
-    examples = view.in_linear_time
-    if match is not None and examples is not None and not _is_linear(estimator):
-        width = int((chosen < examples.shape[2]).sum())
-        # Features that come last are unknown in linear time, such as a `TimingChannel`.
-        padded = np.zeros((*examples.shape[:2], len(names)))
-        padded[..., : examples.shape[2]] = examples
-        whose = view.model_of_points.groups_
-        if not len(examples) == len(whose) == view.model_of_points.n_samples_seen_:
-            whose = np.arange(len(examples))
-
-        def to_space(trials):
-            return space.convert(trials)[..., :width]
-
-        of_reference = None
-        if of_person is not None:
-            of_reference = to_space(unwarped(of_person, reference_view.curves.match.times))
-        if width:
-            examples = with_residuals(padded[..., chosen], whose, left_out)
-            linear = to_space(examples), whose, of_reference
-            later = to_space(unwarped(filled, match.times))
-    converted = space.convert(with_residuals(training, groups, left_out))
-    finder = FaultFinder(
-        converted, groups, space.parts, None if of_person is None else space.convert(of_person),
-        coverage=view.model.coverage,
-        floor=space.outside(converted),
-        linear=linear,
-    )  # fmt: skip
-    pairs = enumerate(zip(space.convert(filled), later, strict=True))
+        theirs = expected.view.of(reference, {}, caller)
+        of_person = expected.filled(theirs.whole)
+        in_time = expected.in_linear_time(of_person, theirs.curves.match)
+        mean, variance = expected_trial(expected.training, view.model.groups_, of_person)
+        std = np.sqrt(variance + expected.left_out * (1 + 1 / len(of_person)))
+    finder = expected.finder(of_person, in_time)
+    curves, filled = view.whole[..., expected.chosen], expected.filled(view.whole)
+    later = expected.in_linear_time(filled, match)
+    later = [None] * n if later is None else later
+    pairs = enumerate(zip(expected.space.convert(filled), later, strict=True))
     faults = [finder.find(x, in_time) if i in sought else [] for i, (x, in_time) in pairs]
     scores = (curves - mean) / std
-    usual, rare, limit = finder.usual_score, finder.rare_score, view.model.simultaneous_factor()
-    return Judged(view, space, curves, mean, std, scores, faults, usual, rare, limit, match)
+    usual, rare, far = finder.usual_score, finder.rare_score, expected.far
+    return Judged(view, expected.space, curves, mean, std, scores, faults, usual, rare, far, match)
+
+
+# What was learnt of fitted estimators, as long as their models live.
+_EXPECTED: WeakKeyDictionary = WeakKeyDictionary()
+
+
+class _Expected:
+    """What a fitted estimator expects of trials, which is learnt when it is first asked.
+
+    Attributes
+    ----------
+    view : View
+        Without trials.
+    space : FaultSpace
+    chosen : ndarray of int
+        The features of the view that are judged.
+    training : ndarray (n_kept, P, n_chosen)
+    mean, std : ndarray (P, n_chosen)
+        Of trials of new people.
+    left_out : ndarray (n_chosen,)
+        The variance outside of the aSpace.
+    """
+
+    def __init__(self, estimator, features):
+        self.view = view = view_of(estimator, features=features, poses=features is None)
+        names, self.chosen = view.names, np.arange(len(view.names))
+        limbs = before = synchronizer = None
+        with suppress(ValueError):
+            before, synchronizer = find_synchronizer(estimator)
+        if features is None:
+            limbs = limbs_of(before, names)
+        else:
+            self.chosen = np.array(choose_features(features, names))
+        chosen = self.chosen
+        self.space = FaultSpace([names[i] for i in chosen], limbs)
+        self.training = view.training[..., chosen].astype(np.float64)
+        self.mean, self.std = view.model.mean_[:, chosen], view.predicted[:, chosen]
+        self.left_out = view.residual_variance[chosen]
+        examples, self._width, self._linear, self._finder = view.in_linear_time, 0, None, None
+        if examples is not None and not _is_linear(synchronizer):
+            # Features that come last are unknown in linear time, such as a `TimingChannel`.
+            self._width = int((chosen < examples.shape[2]).sum())
+        if self._width:
+            padded = np.zeros((*examples.shape[:2], len(names)))
+            padded[..., : examples.shape[2]] = examples
+            whose = view.model_of_points.groups_
+            if not len(examples) == len(whose) == view.model_of_points.n_samples_seen_:
+                whose = np.arange(len(examples))
+            examples = with_residuals(padded[..., chosen], whose, self.left_out)
+            self._linear = self._known_in_time(examples), whose
+
+    @cached_property
+    def far(self):
+        """How far all trials are from the mean at most, in standard deviations."""
+        return self.view.model.simultaneous_factor()
+
+    @classmethod
+    def of(cls, estimator, features):
+        """That of an estimator, which is kept until one of its steps is fitted again."""
+        steps = flat_steps(estimator)
+        state = [value for step in steps for value in vars(step).values()]
+        kept = _EXPECTED.setdefault(find_step(estimator, ActionModel)[1], {})
+        key = repr(features)
+        before, expected = kept.get(key, ([], None))
+        same = len(before) == len(state) and all(a is b for a, b in zip(before, state, strict=True))
+        if not same:
+            expected = cls(estimator, features)
+            kept[key] = state, expected
+        return expected
+
+    def filled(self, whole):
+        """The chosen features of trials, with the mean in their gaps."""
+        return fill_with_mean(whole[..., self.chosen].astype(np.float64), self.mean)
+
+    def in_linear_time(self, filled, match):
+        """Trials on the clock as they were before they were matched, where that is known."""
+        return self._known_in_time(unwarped(filled, match.times)) if self._width else None
+
+    def _known_in_time(self, trials):
+        return self.space.convert(trials)[..., : self._width]
+
+    def finder(self, of_person=None, in_linear_time=None):
+        """The finder of faults, perhaps by right trials of the person; without them it is kept."""
+        if of_person is None and self._finder is not None:
+            return self._finder
+        view, space = self.view, self.space
+        converted = space.convert(with_residuals(self.training, view.model.groups_, self.left_out))
+        finder = FaultFinder(
+            converted,
+            view.model.groups_,
+            space.parts,
+            None if of_person is None else space.convert(of_person),
+            coverage=view.model.coverage,
+            floor=space.outside(converted),
+            linear=None if self._linear is None else (*self._linear, in_linear_time),
+        )
+        if of_person is None:
+            self._finder = finder
+        return finder
 
 
 class FaultSpace:
@@ -454,9 +518,8 @@ def unwarped(trials, times):
     return np.stack([at_times(x, np.interp(frames, of_one, frames)) for x, of_one in pairs])
 
 
-def _is_linear(estimator):
-    """Whether the synchronizer leaves time as it is."""
-    synchronizer = find_synchronizer(estimator)[1]
+def _is_linear(synchronizer):
+    """Whether a synchronizer leaves time as it is."""
     synchronizer = getattr(synchronizer, "synchronizer_", synchronizer)
     return isinstance(synchronizer, LinearSynchronizer) and synchronizer.keyframes_ is None
 

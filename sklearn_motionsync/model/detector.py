@@ -29,7 +29,6 @@ from ..utils.pipelines import (
     MissingMetadata,
     accepted_params,
     flat_steps,
-    route_to_synchronizer,
     steps_to_fit,
     takes_gaps,
 )
@@ -374,12 +373,10 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
 
     def _learn(self, pipeline, X, params, groups):
         """All tests, by the training trials of a fitted pipeline."""
-        caller = "ActionDetector.fit"
-        reached = route_to_synchronizer(pipeline, X, params, caller)
-        trials, synchronizer = reached.trials, reached.synchronizer
+        curves = curves_of(pipeline, X, params, "ActionDetector.fit")
+        trials, synchronizer = curves.match.reached.trials, curves.match.reached.synchronizer
         codes, _ = encode_groups(groups, len(trials), at_least=2)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)
-        curves = curves_of(pipeline, X, params, caller)
         columns = _seen_columns(curves.whole, codes)
         whole, on_clock = curves.whole[..., columns], synchronizer.normalize(trials)
         aligned = ActionModel(coverage=coverage).fit(whole, groups=codes)
@@ -440,8 +437,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         check_is_fitted(self)
         tests, caller = self._tests, f"ActionDetector.{method}"
         try:
-            reached = route_to_synchronizer(self.estimator_, X, params, caller, uses=("transform",))
-            whole = curves_of(self.estimator_, X, params, caller).whole[..., tests.columns]
+            curves = curves_of(self.estimator_, X, params, caller)
+            whole, reached = curves.whole[..., tests.columns], curves.match.reached
             of_person = None
             if reference is not None:
                 of_person = curves_of(self.estimator_, reference, {}, caller).whole

@@ -174,13 +174,13 @@ class Expectation:
         self._whole_norm = np.sum(self._swing * (over_time @ self._swing @ between))
 
     def _prepare_windows(self, windows):
-        self._windows = windows[:, :, np.newaxis] * self.scale
-        weighted = np.einsum("pq,wqf->wpf", self.over_time, self._windows, optimize=True)
-        norms = np.einsum("wpf,wpf->wf", self._windows, weighted)
+        self._windows, scaled = windows, windows[:, :, np.newaxis] * self.scale
+        weighted = np.einsum("pq,wqf->wpf", self.over_time, scaled, optimize=True)
+        norms = np.einsum("wpf,wpf->wf", scaled, weighted)
         self._alone = 1 / np.maximum(norms, _SMALLEST * max(norms.max(initial=0), _SMALLEST))
         self._inverse = []
         for _, columns, blocks in self._alike:
-            windows_of_parts, other = self._windows[:, :, columns], weighted[:, :, columns]
+            windows_of_parts, other = scaled[:, :, columns], weighted[:, :, columns]
             products = np.einsum("wpki,wpkj->wkij", windows_of_parts, other, optimize=True) * blocks
             trace = np.trace(products, axis1=2, axis2=3)[..., np.newaxis, np.newaxis]
             eye = np.eye(columns.shape[1])
@@ -192,7 +192,7 @@ class Expectation:
 
     def of_windows(self, weighed):
         """Gains (n_windows, n_parts), and the changes of each part, (n_windows, n_columns)."""
-        sums = np.einsum("wpf,pf->wf", self._windows, weighed, optimize=True)
+        sums = self._windows @ (self.scale * weighed)
         gains, changes = np.empty((len(sums), len(self.parts))), np.empty_like(sums)
         for (of, columns, _), inverse in zip(self._alike, self._inverse, strict=True):
             sums_of_parts = sums[:, columns]
@@ -204,7 +204,7 @@ class Expectation:
     def of_windows_alone(self, deviations):
         """The largest gain (n_parts,) of a window where other parts tell nothing."""
         weighed = self.over_time @ (deviations * self.scale)
-        sums = np.einsum("wpf,pf->wf", self._windows, weighed, optimize=True)
+        sums = self._windows @ (self.scale * weighed)
         return ((sums**2 * self._alone) @ self._belongs).max(axis=0)
 
     def of_lags(self, weighed):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from sklearn.base import clone
-from sklearn.pipeline import FeatureUnion, Pipeline
+from sklearn.pipeline import FeatureUnion, Pipeline, make_pipeline
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.axes import convert_to_parent_axes
@@ -12,19 +12,20 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import LIMB_NAMES, limb_indices, unit_vectors
 from ..inputs.collections import Trials, as_collection
 from ..inputs.features import as_features, names_of_features
-from ..inputs.validation import check_trials, labels_of_input, names_of_input
+from ..inputs.trial_facts import TrialFacts
+from ..inputs.validation import check_trials, labels_of_input
 from ..matching.counting import first_largest
-from ..synchronizers.dense import DenseSynchronizer
-from ..synchronizers.linear import LinearSynchronizer
 from ..synchronizers.match import Match
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
+    Routed,
     accepted_params,
     explain_missing,
     find_classifier,
     find_step,
     find_synchronizer,
     flat_steps,
+    refuse_params,
     transform_through,
     union_transformers,
 )
@@ -52,20 +53,28 @@ class Curves(NamedTuple):
 
     Attributes
     ----------
-    names : list of str
-        The features of ``whole``.
     whole : ndarray (n_sequences, P, n_features)
         The poses before an aSpace, if there is one; otherwise the features of the model.
     points : trials
         In the features of the model, checked.
     match : Match or None
         By the first synchronizer; None without one.
+    facts : TrialFacts
+        Of the trials as they were recorded.
+    route : _Route
+        The steps to the model.
     """
 
-    names: list
     whole: np.ndarray
     points: Trials
     match: Match | None
+    facts: TrialFacts
+    route: object
+
+    @property
+    def names(self):
+        """The features of ``whole``."""
+        return self.route.names_of_poses()
 
 
 def curves_of(estimator, X, params, caller):
@@ -86,9 +95,7 @@ def curves_of(estimator, X, params, caller):
     Curves
     """
     before, model = find_step(estimator, ActionModel)
-    names = names_of_features(before, model, model.mean_.shape[1])
-    route = _Route.without_aspace(None) if before is None else _Route.to(before, names)
-    return route.curves(model, X, params, caller, names)
+    return _Route.to(before, model).curves(X, params, caller)
 
 
 class View(NamedTuple):
@@ -115,6 +122,8 @@ class View(NamedTuple):
     in_linear_time : ndarray (n_examples, P, n_known) or None
         Training trials before synchronisation, linearly normalised, in the first of these
         features, as many as the synchronizer takes. None without a synchronizer that keeps some.
+    route : _Route
+        The steps to that model.
     """
 
     model: ActionModel
@@ -126,6 +135,15 @@ class View(NamedTuple):
     model_of_points: ActionModel
     residual_variance: np.ndarray
     in_linear_time: np.ndarray | None
+    route: object
+
+    def of(self, X, params, caller):
+        """The same with trials, as for `curves_of`."""
+        curves = self.route.curves(X, params, caller)
+        points, labels = np.stack(curves.points), curves.facts.labels
+        synchronised = self.route.transform(points)
+        whole = points if self.route.aspace is None else curves.whole
+        return self._replace(synchronised=synchronised, whole=whole, labels=labels, curves=curves)
 
     @property
     def training(self):
@@ -162,25 +180,20 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, poses=F
     """
     before, model = find_step(estimator, ActionModel)
     check_is_fitted(model, "threshold_")
-    names = names_of_features(before, model, model.mean_.shape[1])
+    route = _Route.without_aspace(before, model)
+    names = route.names()
     is_needed = any(isinstance(f, str) and f not in names for f in as_features(features))
-    route = _Route.without_aspace(before)
     if before is not None and (is_needed or poses):
-        route = _Route.to(before, names, is_needed)
-    curves, points, labels = None, None, []
-    if X is not None:
-        curves = route.curves(model, X, params or {}, caller, names)
-        points, labels = np.stack(curves.points), labels_of_input(X, curves.points)[0]
+        route = _Route.to(before, model, is_needed)
     linear = _examples(before, route, len(names))
-    if route.aspace is None:
-        variance = np.zeros(len(names))
-        return View(model, names, points, points, labels, curves, model, variance, linear)
-    variance = _RESIDUAL_FACTOR * route.aspace.left_out_variance_
-    names = route.names(names)
-    variance = np.append(variance, np.zeros(len(names) - len(variance)))
-    back = clone(model).fit(route.transform(_training_of(model)), groups=model.groups_)
-    synchronised, whole = (None, None) if X is None else (route.transform(points), curves.whole)
-    return View(back, names, synchronised, whole, labels, curves, model, variance, linear)
+    back, variance = model, np.zeros(len(names))
+    if route.aspace is not None:
+        names = route.names_of_poses()
+        beside = len(names) - len(route.aspace.left_out_variance_)
+        variance = np.append(_RESIDUAL_FACTOR * route.aspace.left_out_variance_, np.zeros(beside))
+        back = clone(model).fit(route.transform(_training_of(model)), groups=model.groups_)
+    view = View(back, names, None, None, [], None, model, variance, linear, route)
+    return view if X is None else view.of(X, params or {}, caller)
 
 
 def _training_of(model):
@@ -213,91 +226,105 @@ class _Route(NamedTuple):
     the points of an aSpace, such as a `TimingChannel`, are kept on the way.
     """
 
-    before: Pipeline | None
+    before: list
     aspace: ASpace | None
     after: list
+    model: ActionModel
 
     @classmethod
-    def to(cls, before, names, is_needed=False):
-        """The route to a model of these features, by way of an aSpace if there is one.
+    def to(cls, before, model, is_needed=False):
+        """The route to a model, by way of an aSpace if there is one.
 
         One that is needed must have a way back: synchronizers alone stand behind it.
         """
-        try:
-            before_aspace, aspace = find_step(before, ASpace)
-        except ValueError:
+        whole = cls.without_aspace(before, model)
+        spaces = [step for step in whole.before if isinstance(step, ASpace)]
+        if not spaces:
             if is_needed:
-                raise
-            return cls.without_aspace(before)
-        steps = flat_steps(before)
-        after = steps[steps.index(aspace) + 1 :]
+                # The error names the steps.
+                find_step(before, ASpace)
+            return whole
+        place = whole.before.index(spaces[0])
+        after = whole.before[place + 1 :]
         without_match = [step for step in after if not hasattr(step, "match")]
         if without_match and is_needed:
             raise ValueError(
                 f"Between ASpace and ActionModel stands {without_match[0]}, which has no inverse: "
-                f"choose features of the model, {', '.join(names)}."
+                f"choose features of the model, {', '.join(whole.names())}."
             )
-        return cls.without_aspace(before) if without_match else cls(before_aspace, aspace, after)
+        return whole if without_match else cls(whole.before[:place], spaces[0], after, model)
 
     @classmethod
-    def without_aspace(cls, before):
+    def without_aspace(cls, before, model):
         """The route by which all that stands before the model is its own."""
-        steps = [] if before is None else flat_steps(before)
-        first = [k for k, step in enumerate(steps) if hasattr(step, "match")]
-        count = first[0] if first else len(steps)
-        named = [(f"step{k}", step) for k, step in enumerate(steps[:count])]
-        return cls(Pipeline(named) if named else None, None, steps[count:])
+        return cls([] if before is None else flat_steps(before), None, [], model)
 
-    def names(self, names_of_model):
+    def names(self):
+        """The features of the model."""
+        steps = [*self.before, *([self.aspace] if self.aspace else []), *self.after]
+        return _names(steps, self.model, self.model.mean_.shape[1])
+
+    def names_of_poses(self):
         """The features of poses, and those of the model beside the points of the aSpace."""
-        aspace = self.aspace
-        of_poses = names_of_features(self.before, aspace, aspace.n_features_in_)
-        return [*of_poses, *names_of_model[len(aspace.components_) :]]
+        if self.aspace is None:
+            return self.names()
+        of_poses = _names(self.before, self.aspace, self.aspace.n_features_in_)
+        return [*of_poses, *self.names()[len(self.aspace.components_) :]]
 
     def transform(self, points):
-        """Poses of points of the aSpace."""
+        """Poses of points of the aSpace; the points without one."""
+        if self.aspace is None:
+            return points
         components, mean = self.aspace.components_, self.aspace.mean_
         points, beside = np.split(points, [len(components)], axis=2)
         return np.concatenate([points @ components + mean, beside], axis=2)
 
-    def curves(self, model, X, params, caller, names):
-        """The `Curves` of trials."""
-        methods = [(step, name) for step in self.after for name in ("match", "transform")]
+    def curves(self, X, params, caller):
+        """The `Curves` of trials, each matched once."""
+        steps = [*self.before, *self.after]
+        methods = [(step, name) for step in steps for name in ("match", "transform")]
         takers = [getattr(step, name) for step, name in methods if hasattr(step, name)]
-        points = transform_through(self.before, X, params, caller, also=takers)
-        whole, first = None, None
-        if self.aspace is not None:
-            whole = check_trials(self.aspace, points, reset=False, level="pose", finite="allow-nan")
-            points = self.aspace.transform(points)
-        # Names are those of tables, which a match does not make.
-        once = names_of_input(model) is None
+        refuse_params(takers, params, caller)
+        points, whole, matches = X, None, []
         with explain_missing(caller):
+            for step in self.before:
+                points = _through(step, points, params, matches, X)
+            if self.aspace is not None:
+                whole = check_trials(
+                    self.aspace, points, reset=False, level="pose", finite="allow-nan"
+                )
+                points = self.aspace.transform(points)
             for step in self.after:
-                points, match = _through(step, points, params, once)
-                whole = whole if whole is None or match is None else match.warp(whole)
-                first = match if first is None else first
-        checked = model.check_trials(points)
+                points = _through(step, points, params, matches, X)
+                whole = whole if whole is None else matches[-1].warp(whole)
+        checked, match = self.model.check_trials(points), matches[0] if matches else None
+        facts = TrialFacts.of(X, None, checked=checked) if match is None else match.facts
         if whole is None:
-            return Curves(names, np.stack(checked), checked, first)
+            return Curves(np.stack(checked), checked, match, facts, self)
         beside = np.stack(as_collection(points))[:, :, len(self.aspace.components_) :]
         whole = np.concatenate([np.stack(whole), beside], axis=2)
-        return Curves(self.names(names), whole, checked, first)
+        return Curves(whole, checked, match, facts, self)
 
 
-def _through(step, points, params, once):
-    """Trials after a step, and their match if it makes one.
+def _names(steps, estimator, n_features):
+    """The features that reach an estimator behind some steps."""
+    return names_of_features(make_pipeline(*steps) if steps else None, estimator, n_features)
 
-    Synchronizers that only warp match them once, where tables are not asked for.
-    """
-    match, accepted = None, accepted_params(step.transform, params)
-    if hasattr(step, "match"):
-        only_warps = isinstance(step, DenseSynchronizer | LinearSynchronizer)
-        if once and only_warps and type(points) in (list, np.ndarray):
-            points = step.check_trials(points)
-        match = step.match(points, **accepted_params(step.match, params))
-        if isinstance(points, Trials) and points.kind != "rows":
-            return match.warp(points), match
-    return step.transform(points, **accepted), match
+
+def _through(step, points, params, matches, X):
+    """Trials X after a step; if it matches them, it warps them by this match, which is appended."""
+    if not hasattr(step, "match"):
+        return step.transform(points, **accepted_params(step.transform, params))
+    _, synchronizer = find_synchronizer(step)
+    trials = synchronizer.check_trials(points)
+    facts = TrialFacts.of(X, params.get("frame_rate"), checked=trials)
+    accepted = accepted_params(synchronizer.match, params)
+    match = synchronizer.match(facts.label(trials), **accepted)
+    # What is hidden by a confidence is hidden in the trials of the match.
+    seen = trials if match.reached is None else match.reached.trials
+    reached = Routed(None, synchronizer, seen, accepted, facts)
+    matches.append(match.of_trials(facts, reached))
+    return step.transform_matched(seen, match, **accepted_params(step.transform_matched, params))
 
 
 # -- limbs -----------------------------------------------------------------------------------

@@ -21,12 +21,13 @@ from ..display.bodies import (
     project,
     read_positions,
 )
-from ..inputs.numbers import as_numbers
-from ..inputs.resampling import as_frame_rates
+from ..inputs.collections import Trials
+from ..inputs.keyframes import Keyframes
+from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import NamesLike, NumbersLike, Path, Table, TrialsLike, ValuesLike
 from ..inputs.wording import counted
-from ..synchronizers.match import Match, match_of_times, rates_of
-from ..utils.pipelines import find_synchronizer, flat_steps, transform_through, union_transformers
+from ..synchronizers.match import Match, match_of_times
+from ..utils.pipelines import transform_through, union_transformers
 from .page import Page, check_path, paragraph, read_part
 
 __all__ = ["add_player_of", "player_of", "write_player"]
@@ -75,9 +76,9 @@ def write_player(
     names : list of str, default=None
         The names under the trials; by default their labels in X, or numbers.
     keyframes : array-like or DataFrame, shape (n_sequences, n_keyframes), default=None
-        Frames of each trial, NaN where one is not known. They are marked below the slider,
-        and a button for each leads there. Columns of a table are their names. On one clock a mark
-        is at the median of the trials.
+        Frames of each trial, or seconds where a frame rate is given; NaN where one is not known.
+        They are marked below the slider, and a button for each leads there. Columns of a table are
+        their names. On one clock a mark is at the median of the trials.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second of X; by default what tables tell, as in `Match.offsets_in`. If it is not
         known, the median trial takes four seconds.
@@ -135,8 +136,6 @@ def write_player(
                 f"Trial {i} has {points.shape[1:]} points and axes, and trial 0 "
                 f"{bodies[0][0].shape[1:]}; all must have the same."
             )
-    lengths, rates = np.array([len(points) for points, _, _ in bodies]), rates_of(X, frame_rate)
-    seconds = None if rates is None else (lengths - 1) / np.ravel(as_frame_rates(rates, n))
     if match is not None and not isinstance(match, Match):
         match = Match.from_estimator(match, X)
     if match is not None and len(match.times) != n:
@@ -145,7 +144,13 @@ def write_player(
             f"{len(match.times)}: give Match.from_estimator(estimator, X)."
         )
     times = None if match is None else match.times
-    marks = [] if keyframes is None else _marks(keyframes, lengths, times)
+    facts_of, marks = TrialFacts.of if match is None else match.facts_of, []
+    facts = facts_of(trials, frame_rate)
+    seconds = None if facts.frame_rates is None else facts.durations()
+    if keyframes is not None:
+        rows = Keyframes(keyframes, n, frame_rate, anywhere=True)
+        shares = rows.shares(Trials([points for points, _, _ in bodies], "list", facts.labels))
+        marks = _marks(shares, getattr(keyframes, "columns", ()), times)
     data, note = data_of_bodies(bodies, names, seconds, times, marks)
     data["alone"] = True
     page = Page()
@@ -153,23 +158,9 @@ def write_player(
     return page.write(path, "Side by side" if title is None else title)
 
 
-def _marks(keyframes, lengths, times):
+def _marks(shares, names, times):
     """Key-frames by name, as shares of each trial and of the clock; None if not known."""
-    names = [str(name) for name in getattr(keyframes, "columns", ())]
-    frames = as_numbers(keyframes, "keyframes", dtype=np.float64)
-    if frames.ndim != 2 or len(frames) != len(lengths):
-        raise ValueError(
-            f"keyframes must have shape ({len(lengths)}, n_keyframes), one row a trial, with "
-            f"NaN where one is not known; got {frames.shape}."
-        )
-    shares, out = frames / (lengths[:, np.newaxis] - 1), []
-    outside = np.argwhere((shares < 0) | (shares > 1))
-    if len(outside):
-        i, k = outside[0]
-        raise ValueError(
-            f"Key-frame {k} of trial {i} is {frames[i, k]:g}, and its frames are from 0 to "
-            f"{lengths[i] - 1}: give frames of each trial."
-        )
+    out = []
     for k, of_trials in enumerate(shares.T):
         clock = None
         if times is not None and np.isfinite(of_trials).any():
@@ -180,23 +171,22 @@ def _marks(keyframes, lengths, times):
             ]
             clock = float(np.nanmedian(places)) / last
         of_trials = [None if np.isnan(x) else float(x) for x in of_trials]
-        name = names[k] if names else f"key-frame {k}"
+        name = str(names[k]) if len(names) else f"key-frame {k}"
         out.append({"name": name, "own": of_trials, "clock": clock})
     return out
 
 
-def _bodies_of(estimator, X, params):
+def _bodies_of(reached, X, params):
     """The joint positions that reach the first step with a skeleton, and that; else X and None.
 
     Parameters
     ----------
-    estimator : synchronizer, or Pipeline with one
-    X : trials, as the estimator takes them
+    reached : Routed
+    X : trials, as the first step takes them
     params : dict
         As for `transform_through`.
     """
-    before, synchronizer = find_synchronizer(estimator)
-    steps = [] if before is None else flat_steps(before)
+    *steps, synchronizer = reached.steps
     for k, step in enumerate(steps):
         for transformer in union_transformers(step):
             if isinstance(transformer, PositionsTransformer):
@@ -208,10 +198,10 @@ def _bodies_of(estimator, X, params):
     return X, None
 
 
-def add_player_of(page, trials, estimator, X, params, skeleton):
+def add_player_of(page, trials, X, params, skeleton):
     """Add the player of a report, where there are bodies."""
     if skeleton is None:
-        X, skeleton = _bodies_of(estimator, X, params)
+        X, skeleton = _bodies_of(trials.aligned.reached, X, params)
     if skeleton is not None:
         add_player(page, *player_of(trials, X, skeleton))
 

@@ -21,7 +21,6 @@ from ..display.arguments import labels_of_signals
 from ..display.base import (
     WIDTH,
     TimeAxis,
-    clock_rate,
     curves,
     front_line,
     group_styles,
@@ -34,7 +33,6 @@ from ..display.base import (
 from ..display.groups import display_of_groups
 from ..display.synchronization import SynchronizationDisplay
 from ..inputs.features import choose_features
-from ..inputs.resampling import as_frame_rates
 from ..inputs.types import (
     Features,
     Labels,
@@ -42,14 +40,12 @@ from ..inputs.types import (
     RandomState,
     TrialsLike,
     Unit,
-    ValuesLike,
 )
-from ..inputs.validation import labels_of_input
 from ..inputs.wording import counted
 from ..matching.counting import first_largest
-from ..synchronizers.match import UNITS, rates_of
+from ..synchronizers.match import UNITS, Match
 from ..utils.groups import names_of_groups
-from ..utils.pipelines import flat_steps, index_of_pattern
+from ..utils.pipelines import index_of_pattern
 from .page import Page, check_path, list_of, number, paragraph, picture, table_of
 from .player import add_player_of
 
@@ -65,7 +61,7 @@ _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 def write_report(
     path: Path,
-    estimator: BaseEstimator,
+    estimator: BaseEstimator | Match,
     X: TrialsLike,
     y: Labels | None = None,
     *,
@@ -78,7 +74,6 @@ def write_report(
     left_out: Mapping[Any, str] | None = None,
     title: str | None = None,
     unit: Unit = "percent",
-    frame_rate: float | ValuesLike | None = None,
     random_state: RandomState = 0,
     **params: Any,
 ) -> pathlib.Path:
@@ -91,7 +86,7 @@ def write_report(
     ----------
     path : str or path
         Of the file, such as ``"report.html"``, which is replaced once the report is complete.
-    estimator : synchronizer, or Pipeline with one
+    estimator : synchronizer, Pipeline with one, or Match of X
         Fitted, as for `compare_groups`.
     X : trials
         As the estimator takes them.
@@ -116,13 +111,11 @@ def write_report(
         Of the page; by default "Aligned trials".
     unit : {"percent", "frames", "seconds"}, default="percent"
         Of time, as in `compare_groups`.
-    frame_rate : float, or array-like of shape (n_sequences,), default=None
-        Frames a second of X, for durations in seconds; by default what tables tell. Where it is
-        given, key-frames are in seconds, as for ``match``.
     random_state : int, RandomState instance or None, default=0
         Draws the permutations of the test.
     **params : dict
-        What synchronizing X takes besides, such as ``keyframes``.
+        What synchronizing X takes besides: ``frame_rate``, frames a second of X, which seconds need
+        where tables do not tell; ``keyframes``, which are seconds where a frame rate is given.
 
     Returns
     -------
@@ -162,7 +155,6 @@ def write_report(
             signals=signals,
             features=features,
             unit=unit,
-            frame_rate=frame_rate,
         )
         comparison = None
         labels = None if covariate else y
@@ -170,23 +162,23 @@ def write_report(
             n = len(aligned.curves)
             study = Study.of(y, groups, covariate=covariate, paired=paired, n=n)
             comparison = compare_aligned(aligned, study, random_state=random_state)
-        trials = TrialSet.of(X, aligned, frame_rate, labels, groups, y if covariate else None)
+        trials = TrialSet.of(aligned, labels, groups, y if covariate else None)
         page = Page()
-        _add_set(page, trials, estimator, left_out)
+        _add_set(page, trials, left_out)
         _add_signals(page, trials, features)
         _add_timing(page, trials)
         if comparison is not None:
             display = display_of_groups(aligned, labels, groups, comparison, features=features)
             _add_test(page, comparison, display.plot().figure_, not covariate)
         _add_doubtful(page, trials)
-        add_player_of(page, trials, estimator, X, params, skeleton)
+        add_player_of(page, trials, X, params, skeleton)
     return page.write(path, "Aligned trials" if title is None else title)
 
 
 # -- the sections --------------------------------------------------------------------------
 
 
-def _add_set(page, trials, estimator, left_out):
+def _add_set(page, trials, left_out):
     if left_out is not None and not isinstance(left_out, Mapping):
         raise ValueError(
             "left_out must be a mapping of labels of trials to reasons, such as "
@@ -206,7 +198,7 @@ def _add_set(page, trials, estimator, left_out):
         columns=["trial", "reason"],
     )
     with config_context(print_changed_only=True):
-        steps = [" ".join(repr(step).split()) for step in flat_steps(estimator)]
+        steps = [" ".join(repr(step).split()) for step in trials.aligned.reached.steps]
     page.add(
         "The set",
         paragraph(f"{text}, on {len(trials.aligned.clock)} frames. {pattern}"),
@@ -365,9 +357,10 @@ class TrialSet(NamedTuple):
     signals: list
 
     @classmethod
-    def of(cls, X, aligned, frame_rate, y, groups, covariate):
+    def of(cls, aligned, y, groups, covariate):
         """Those of the arguments of `write_report`."""
         reached, n = aligned.reached, len(aligned.curves)
+        facts = reached.facts
         of_groups = GroupsOfPeople.of(y, groups, n)
         design = {}
         if y is not None:
@@ -376,17 +369,15 @@ class TrialSet(NamedTuple):
             design["person"] = names_of_groups(groups, n)
         if covariate is not None:
             design["covariate"] = np.asarray(covariate, dtype=float)
-        frames = np.array([len(x) for x in reached.trials])
-        rates = rates_of(X, frame_rate)
         units = dict(zip(aligned.names, aligned.units, strict=True))
         return cls(
             aligned,
-            list(map(text_of_label, labels_of_input(X, reached.trials)[0])),
+            list(map(text_of_label, facts.labels)),
             index_of_pattern(reached.synchronizer, reached.trials),
             pd.DataFrame(design, index=range(n)),
             of_groups,
-            frames,
-            None if rates is None else (frames - 1) / np.ravel(as_frame_rates(rates, n)),
+            facts.lengths.astype(int),
+            None if facts.frame_rates is None else facts.durations(),
             labels_of_signals(aligned.names, units),
         )
 
@@ -515,15 +506,15 @@ def draw_signals(trials, shown):
         The signals.
     """
     aligned, pattern = trials.aligned, trials.pattern
-    n_frames, rate = len(aligned.clock), clock_rate(aligned.clock)
-    lengths, keyframes = [n_frames] * len(aligned.even), _keyframes_of(aligned)
+    n_frames, n = len(aligned.clock), len(aligned.even)
+    lasting, keyframes = [aligned.clock[-1]] * n, _keyframes_of(aligned)
     after = aligned.curves[:, :, shown]
     is_mean = pattern is None
     display = SynchronizationDisplay(
         list(aligned.even[:, :, shown]),
         after,
         aligned.match,
-        TimeAxis(aligned.unit, n_frames, lengths, rate, keyframes=keyframes),
+        TimeAxis(aligned.unit, n_frames, [n_frames] * n, lasting, keyframes=keyframes),
         [trials.signals[i] for i in shown],
         after.mean(axis=0) if is_mean else after[pattern],
         ("time-normalised", "their mean" if is_mean else "the pattern"),
@@ -537,9 +528,7 @@ def draw_offsets(trials):
     """The offsets of all trials, and the mean of each group."""
     aligned = trials.aligned
     offsets, clock = aligned.offsets, aligned.clock
-    time = TimeAxis(
-        aligned.unit, len(clock), None, clock_rate(clock), keyframes=_keyframes_of(aligned)
-    )
+    time = TimeAxis.of_clock(aligned.unit, clock, keyframes=_keyframes_of(aligned))
     figure, (axis,) = panels(None, [(0, 0)], (1, 1), (WIDTH, 3.4))
     names = list(trials.design.get("group", [""] * len(offsets)))
     styles = group_styles(names)

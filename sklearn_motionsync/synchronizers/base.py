@@ -23,6 +23,7 @@ from ..inputs.features import check_input_features
 from ..inputs.keyframes import Keyframes
 from ..inputs.recorded import refuse_moved_events
 from ..inputs.resampling import as_frame_rates
+from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import (
     Indexed,
     NamesLike,
@@ -36,7 +37,6 @@ from ..inputs.types import (
 from ..inputs.validation import (
     SequenceLevelMixin,
     TrialTransformerMixin,
-    labels_of_parts,
     names_of_input,
     read_source,
     restore,
@@ -49,6 +49,7 @@ from ..matching.warps import normalise
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
+from ..utils.pipelines import Routed
 from .intervals import Intervals, joined
 from .match import Match, check_match
 from .training import (
@@ -211,6 +212,47 @@ class Synchronizer(
         """
         return self._warp(X, fill)
 
+    def transform_matched(
+        self, X: TrialsLike, match: Match, *, fill: Literal["model"] | None = None
+    ) -> Transformed:
+        """Warp trials whose match is known, so that they are matched once.
+
+        Parameters
+        ----------
+        X : trials
+            As for ``match``, which was given the same.
+        match : Match
+            That of X.
+        fill : {None, "model"}, default=None
+            As for ``transform``.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            What ``transform`` gives for X.
+
+        Raises
+        ------
+        ValueError
+            If the match is of another number of trials, or on another clock.
+
+        Examples
+        --------
+        >>> from sklearn_motionsync import DenseSynchronizer
+        >>> from sklearn_motionsync.datasets import make_gait
+        >>> gait = make_gait(6, random_state=0)
+        >>> sync = DenseSynchronizer(n_frames=51).fit(gait.data)
+        >>> match = sync.match(gait.data)
+        >>> aligned = sync.transform_matched(gait.data, match)
+        >>> bool((aligned == sync.transform(gait.data)).all())
+        True
+        """
+        if fill is not None:
+            check_fill(fill)
+        trials = self.check_trials(X)
+        check_match(match, len(trials), self.n_frames_, type(self).__name__)
+        return self._restored(trials, self._warped(trials, match), fill)
+
     def match(self, X: TrialsLike) -> Match:
         """Match trials to the pattern.
 
@@ -293,20 +335,29 @@ class Synchronizer(
         # Further parameters are given for all trials at once.
         source = None if params else self._read_in_parts(X)
         if source is None:
-            trials = self.check_trials(X)
-            out = self._warp_part(trials, **params)
+            trials = self._seen(self.check_trials(X), params)
+            out = self._warped(trials, self._match(trials, **params))
         else:
             n_trials, portions = source
             trials, out = self._warp_parts(n_trials, portions)
+        return self._restored(trials, out, fill)
+
+    def _seen(self, trials, params):
+        """Trials without what is hidden; what hides it is taken out of the params of a match."""
+        return trials
+
+    def _warped(self, trials, match):
+        """Checked trials at the times of their match."""
+        return match.warp(trials)
+
+    def _restored(self, trials, out, fill):
+        """Warped trials as ``transform`` gives them."""
         if fill == "model" and is_gappy(out):
             examples = Trials(list(self.examples_), "list", list(range(len(self.examples_))))
-            fill_warped(out, self._warp_part(examples))
+            fill_warped(out, self._warped(examples, self._match(examples)))
         if trials.kind == "rows":
             return out[:, :, 0]
         return restore(self, trials, out, frames=range(out.shape[1]))
-
-    def _warp_part(self, trials, **params):
-        return self._match(trials, **params).warp(trials)
 
     def _match(self, trials, **params):
         """The match of checked trials."""
@@ -316,15 +367,16 @@ class Synchronizer(
 
     def _warp_parts(self, n_sequences, portions):
         """Labels of trials that are read in portions, and these warped."""
-        out, labels, levels = None, [], set()
+        out, facts, start = None, [], 0
         for trials in portions:
-            warped, start = self._warp_part(trials), len(labels)
+            warped = self._warped(trials, self._match(trials))
             if out is None:
                 out = np.empty((n_sequences, *warped.shape[1:]), warped.dtype)
-            labels += trials.labels
-            levels.add(trials.levels)
-            out[start : len(labels)] = warped
-        return labels_of_parts(labels, levels, trials.names), out
+            out[start : start + len(trials)] = warped
+            start += len(trials)
+            facts.append(TrialFacts.of(trials))
+        facts = TrialFacts.joined(facts)
+        return Trials((), "list", facts.labels, names=trials.names, levels=facts.levels), out
 
     def _read_in_parts(self, X):
         """The number of trials, and checked portions of them; None if all are in memory."""
@@ -333,23 +385,23 @@ class Synchronizer(
             return None
         return len(source), read_source(self, source, self._read_rows_in_fit())
 
-    def _match_in_parts(self, X):
-        """The match of trials, which may be read in parts."""
-        source = self._read_in_parts(X)
-        if source is None:
-            return self._match(self.check_trials(X))
-        matches, tells = [], False
+    def _match_in_parts(self, X, frame_rate, source):
+        """The match of trials that are read in parts."""
+        matches, facts, tells = [], [], False
         for trials in source[1]:
             match = self._match(trials)
             tells = match.intervals is not None
             matches.append((match.times, match.distances))
+            facts.append(TrialFacts.of(trials))
         times, distances = map(np.concatenate, zip(*matches, strict=True))
         intervals = None
         if tells:
             # Of this fit, also after another one.
             measured = MethodType(self._measured_in_parts.__func__, copy(self))
             intervals = Intervals(times, lambda: measured(X))
-        return Match(times, distances, intervals)
+        known = TrialFacts.joined(facts)
+        known = known if frame_rate is None else known.at(frame_rate)
+        return Match(times, distances, intervals).of_trials(known)
 
     def _measured_in_parts(self, X):
         """What the intervals of trials need, which are read and matched once more."""
@@ -568,14 +620,16 @@ class AnchoredSynchronizer(Synchronizer):
             the pattern; ``distances``, shape (n_sequences,).
         """
         params = self._given(X, keyframes, frame_rate, confidence)
-        if not params:
-            return self._match_in_parts(X)
-        trials = self.check_trials(X)
-        trials = with_confidence(trials, params.pop("confidence", None))
-        return self._match(trials, **params)
+        if not params and (source := self._read_in_parts(X)) is not None:
+            return self._match_in_parts(X, frame_rate, source)
+        trials = self._seen(self.check_trials(X), params)
+        facts = TrialFacts.of(trials, frame_rate)
+        # Of this fit, also after another one.
+        reached = Routed(None, copy(self), trials, params, facts)
+        return self._match(trials, **params).of_trials(facts, reached)
 
     def _given(self, X, keyframes, frame_rate, confidence=None) -> dict[str, Any]:
-        """What is given, as arguments of ``_warp_part``."""
+        """What is given, as arguments of ``_seen`` and ``_match``."""
         params: dict[str, Any] = {}
         if keyframes is not None:
             refuse_moved_events(X)
@@ -586,9 +640,8 @@ class AnchoredSynchronizer(Synchronizer):
             params["confidence"] = confidence
         return params
 
-    def _warp_part(self, trials, keyframes=None, frame_rate=None, confidence=None):
-        trials = with_confidence(trials, confidence)
-        return self._match(trials, keyframes, frame_rate).warp(trials)
+    def _seen(self, trials, params):
+        return with_confidence(trials, params.pop("confidence", None))
 
     def _shares(self, trials, keyframes, frame_rate):
         """Key-frames of trials as shares of them, by those of the fit; None if none are."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import html
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from copy import copy
 from numbers import Real
 from typing import Any, Self
 
@@ -12,11 +13,10 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 
-from ..inputs.collections import as_collection
 from ..inputs.long_tables import to_frame
 from ..inputs.numbers import as_numbers
-from ..inputs.recorded import frame_rate_of_rows
 from ..inputs.resampling import as_frame_rates
+from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import (
     Labels,
     NumbersLike,
@@ -29,7 +29,7 @@ from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..matching.counting import ROUNDING, first_largest
 from ..matching.warps import sample
-from ..utils.pipelines import route_to_synchronizer
+from ..utils.pipelines import Routed, route_to_synchronizer
 from .intervals import Intervals
 
 __all__ = [
@@ -40,7 +40,6 @@ __all__ = [
     "check_match",
     "check_unit",
     "match_of_times",
-    "rates_of",
     "timing_table",
 ]
 
@@ -79,6 +78,13 @@ class Match:
         straight to the base; from others the squared distance to the pattern.
     intervals : Intervals or None
         As given; ``interval`` asks it.
+    facts : TrialFacts or None
+        What is known of the trials that were matched: their lengths, frame rates and labels. None
+        of warps that are given.
+    reached : Routed or None
+        The trials and the synchronizer that matched them, so that comparisons, figures and reports
+        take the match in place of the estimator. None of warps that are given, of trials that were
+        read in parts, and after unpickling.
 
     Raises
     ------
@@ -98,9 +104,9 @@ class Match:
     >>> match = LinearSynchronizer(n_frames=5).fit(X).match(X)
     >>> match
     Match(2 trials on 5 frames)
-    >>> match.frames(X)[1].tolist()  # the second trial has nine frames
+    >>> match.frames()[1].tolist()  # the second trial has nine frames
     [0.0, 2.0, 4.0, 6.0, 8.0]
-    >>> match.seconds(X, frame_rate=4)[1].tolist()
+    >>> match.seconds(frame_rate=4)[1].tolist()
     [0.0, 0.5, 1.0, 1.5, 2.0]
     >>> forces = [np.arange(41.0)[:, None], np.arange(81.0)[:, None]]  # ten times the rate
     >>> match.warp(forces)[1].ravel().tolist()
@@ -115,7 +121,7 @@ class Match:
     [[2.0, 1.5, 0.75, 0.5, 0.5]]
     """
 
-    __slots__ = ("distances", "intervals", "times")
+    __slots__ = ("distances", "facts", "intervals", "reached", "times")
 
     def __init__(
         self,
@@ -155,6 +161,30 @@ class Match:
             )
         self.times, self.distances = times, distances
         self.intervals = intervals
+        self.facts: TrialFacts | None = None
+        self.reached: Routed | None = None
+
+    def __getstate__(self):
+        state = {name: getattr(self, name) for name in self.__slots__}
+        return None, state | {"reached": None}
+
+    def of_trials(self, facts: TrialFacts, reached: Routed | None = None) -> Match:
+        """The same warps, with what is known of the trials that were matched.
+
+        Parameters
+        ----------
+        facts : TrialFacts
+            Their lengths, frame rates and labels.
+        reached : Routed, default=None
+            The trials and the synchronizer.
+
+        Returns
+        -------
+        Match
+        """
+        known = copy(self)
+        known.facts, known.reached = facts, reached
+        return known
 
     @property
     def offsets(self) -> np.ndarray:
@@ -196,10 +226,8 @@ class Match:
             Probability, above 0 and below 1.
         unit : {"frames", "percent", "seconds"}, default="frames"
             Of the bounds, from the beginning of each trial, as in ``offsets_in``.
-        X : trials, or array-like of numbers, shape (n_sequences,), default=None
-            For seconds: the trials, or how many frames each has.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            For seconds: frames per second of X, as in ``offsets_in``.
+        X, frame_rate : default=None
+            For seconds, as in ``offsets_in``.
 
         Returns
         -------
@@ -268,10 +296,11 @@ class Match:
             Frames of the pattern, as ``offsets``; per cent of the clock, ``100 Delta / (P - 1)``;
             or seconds of each trial as recorded.
         X : trials, or array-like of numbers, shape (n_sequences,), default=None
-            For seconds: the trials, or how many frames each has.
+            For seconds: the trials, or how many frames each has. By default those that were
+            matched.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             For seconds: frames per second of X. By default what tables tell: an index in seconds,
-            or ``attrs["frame_rate"]`` of `io.read_motion`.
+            or ``attrs["frame_rate"]`` of `io.read_motion`; or else what ``match`` was told.
         coverage : float, default=None
             Probability of the intervals of ``interval``, such as 0.9. None for none.
 
@@ -284,8 +313,8 @@ class Match:
         Raises
         ------
         ValueError
-            If there is no such unit, or X or the frame rate is missing for seconds; and as from
-            ``seconds``, and with a coverage from ``interval``.
+            If there is no such unit, or trials or their frame rate are not known for seconds; and
+            as from ``seconds``, and with a coverage from ``interval``.
         """
         offsets = self._in_unit(self.offsets, unit, X, frame_rate)
         if coverage is None:
@@ -309,14 +338,11 @@ class Match:
         ----------
         unit : {"frames", "percent", "seconds"}, default="frames"
             Of ``time`` and ``offset``, as in ``offsets_in``.
-        X : trials, or array-like of numbers, shape (n_sequences,), default=None
-            Needed for seconds. The labels of X are those of the table.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            For seconds: frames per second of X. By default what tables tell: an index in seconds,
-            or ``attrs["frame_rate"]`` of `io.read_motion`.
+        X, frame_rate : default=None
+            For seconds, as in ``offsets_in``.
         labels : sequence of length n_sequences, or Index, default=None
-            Labels of the trials; by default those of X, or 0, 1, ... A MultiIndex makes
-            several levels.
+            Labels of the trials; by default those of X, or of the trials that were matched. A
+            MultiIndex makes several levels.
         coverage : float, default=None
             Probability of the intervals of ``interval``, such as 0.9. None for none.
 
@@ -354,9 +380,11 @@ class Match:
         }
         if labels is not None:
             self._check_count(labels, "label")
+        elif X is not None or self.facts is not None:
+            labels = self.facts_of(X, frame_rate).index
         if coverage is not None:
             columns["lower"], columns["upper"] = self.interval(coverage, unit, X, frame_rate)
-        table = timing_table(columns, X, labels)
+        table = timing_table(columns, labels)
         if coverage is not None:
             table["doubtful"] = np.repeat(self.doubtful, self.times.shape[1])
         return table
@@ -425,14 +453,15 @@ class Match:
         self._check_count(arrays, "sequence")
         return sample(arrays, self.times, self.times.shape[1])
 
-    def frames(self, X: TrialsLike | ValuesLike) -> np.ndarray:
+    def frames(self, X: TrialsLike | ValuesLike | None = None) -> np.ndarray:
         """The frame of each trial that corresponds to each frame of the pattern.
 
         Parameters
         ----------
-        X : trials, or array-like of numbers, shape (n_sequences,)
-            The trials, sequences recorded with them, or how many frames each has. For
-            univariate trials in rows give ``[X.shape[1]] * len(X)``.
+        X : trials, or array-like of numbers, shape (n_sequences,), default=None
+            The trials, sequences recorded with them, or how many frames each has; by default the
+            trials that were matched. For univariate trials in rows give
+            ``[X.shape[1]] * len(X)``.
 
         Returns
         -------
@@ -444,22 +473,19 @@ class Match:
         ValueError
             If there is not one a trial, or one has fewer than two frames.
         """
-        return self._stretched(self.times, X)
+        return self._stretched(self.times, self.facts_of(X))
 
     def seconds(
         self,
-        X: TrialsLike | ValuesLike,
+        X: TrialsLike | ValuesLike | None = None,
         frame_rate: float | ValuesLike | None = None,
     ) -> np.ndarray:
         """The time in each trial that corresponds to each frame of the pattern.
 
         Parameters
         ----------
-        X : trials, or array-like of numbers, shape (n_sequences,)
-            The trials, or how many frames each has, as for ``frames``.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames per second of X; one for each trial if they differ. By default what tables
-            tell, as in ``to_frame``.
+        X, frame_rate : default=None
+            The trials and their frame rate, as in ``offsets_in``.
 
         Returns
         -------
@@ -472,7 +498,43 @@ class Match:
             As from ``frames``; or if a rate is not above 0 or not known, or there is not one a
             trial.
         """
-        return self._in_seconds(self.times, X, frame_rate)
+        return self._in_unit(self.times, "seconds", X, frame_rate)
+
+    def facts_of(
+        self,
+        X: TrialsLike | ValuesLike | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> TrialFacts:
+        """What is known of trials that are given, or else of those that were matched.
+
+        Parameters
+        ----------
+        X, frame_rate : default=None
+            As in ``offsets_in``.
+
+        Returns
+        -------
+        TrialFacts
+            Their lengths, frame rates and labels. What was recorded with a trial lasts as long.
+
+        Raises
+        ------
+        ValueError
+            If X is not given, and the match does not know its trials; or as from ``frames``.
+        """
+        if X is not None:
+            facts = TrialFacts.of(X, frame_rate)
+            self._check_count(facts.lengths, "length")
+            known = self.facts
+            if facts.frame_rates is None and known is not None and known.frame_rates is not None:
+                facts = facts.at((facts.lengths - 1) / known.durations())
+            return facts
+        if self.facts is None:
+            raise ValueError(
+                "unit='seconds' needs X, the trials or how many frames each has, and frame_rate: "
+                "this match is of warps that were given, and does not know its trials."
+            )
+        return self.facts if frame_rate is None else self.facts.at(frame_rate)
 
     def _known_intervals(self):
         if self.intervals is None:
@@ -484,40 +546,18 @@ class Match:
 
     def _in_unit(self, frames, unit, X, frame_rate):
         """Times or offsets in frames of the pattern, in a unit of time."""
-        if check_unit(unit) == "seconds":
-            if X is None:
-                raise ValueError(
-                    "unit='seconds' needs X, the trials or how many frames each has, and "
-                    "frame_rate."
-                )
-            return self._in_seconds(frames, X, frame_rate)
-        rates_of(X, frame_rate, unit)
-        if X is not None:
-            self._check_count(_lengths(X), "length")
+        is_given = X is not None or (frame_rate is not None and self.facts is not None)
+        if check_unit(unit) == "seconds" or is_given:
+            facts = self.facts_of(X, frame_rate)
+        elif frame_rate is not None:
+            as_frame_rates(frame_rate)
+        if unit == "seconds":
+            return self._stretched(frames, facts) / facts.known_rates()[:, np.newaxis]
         return frames * (100 / (self.times.shape[1] - 1) if unit == "percent" else 1)
 
-    def _stretched(self, times, X):
+    def _stretched(self, times, facts):
         """Frames of the pattern in frames of each trial."""
-        lengths = _lengths(X)
-        self._check_count(lengths, "length")
-        sound = (lengths >= 2) & (lengths == np.floor(lengths))
-        if not sound.all():
-            i = int(np.argmin(sound))
-            raise ValueError(
-                f"Trial {i} has {counted(lengths[i], 'frame')}; give the trials, or "
-                "how many frames each has, whole numbers of at least 2."
-            )
-        return times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
-
-    def _in_seconds(self, times, X, frame_rate):
-        frame_rate = rates_of(X, frame_rate)
-        if frame_rate is None:
-            raise ValueError(
-                "Time in seconds needs X and frame_rate, which X does not tell: give frames per "
-                "second, or tables with an index in seconds or attrs['frame_rate']."
-            )
-        rates = as_frame_rates(frame_rate, len(self.times))
-        return self._stretched(times, X) / rates
+        return times * (facts.lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
 
     def __iter__(self) -> Iterator[np.ndarray]:
         return iter((self.offsets, self.times, self.distances))
@@ -603,16 +643,15 @@ def check_unit(unit):
     return unit
 
 
-def timing_table(columns, X, labels):
+def timing_table(columns, index=None):
     """A table indexed by trial and frame of the pattern.
 
     Parameters
     ----------
     columns : dict of ndarray, shape (n_sequences, P)
         By name.
-    X : trials, how many frames each has, or None
-        Its labels are those of the table if there are no ``labels``.
-    labels : sequence of length n_sequences, Index, or None
+    index : sequence of length n_sequences, or Index, default=None
+        Labels of the trials; by default 0, 1, ...
 
     Returns
     -------
@@ -622,49 +661,4 @@ def timing_table(columns, X, labels):
         pd.DataFrame(np.column_stack(of_one), columns=list(columns))
         for of_one in zip(*columns.values(), strict=True)
     ]
-    return to_frame(tables, trials=_labels_of(X) if labels is None else labels)
-
-
-def rates_of(X, frame_rate=None, unit="seconds"):
-    """The frame rates of trials: as given, or for seconds as tables tell them.
-
-    Returns
-    -------
-    float, array-like of shape (n_sequences,), or None if one is not known
-    """
-    if frame_rate is not None:
-        as_frame_rates(frame_rate)
-    if frame_rate is not None or unit != "seconds" or X is None or _are_lengths(X):
-        return frame_rate
-    rates = [frame_rate_of_rows(x) for x in as_collection(X) or [None]]
-    return None if None in rates else rates
-
-
-def _are_lengths(X):
-    """Whether X holds how many frames trials have, instead of the trials."""
-    is_plain = hasattr(X, "__len__") and not isinstance(X, Mapping) and not hasattr(X, "columns")
-    return is_plain and all(np.ndim(n) == 0 for n in X)
-
-
-def _lengths(X):
-    """How many frames the trials have, of trials or of such numbers."""
-    if getattr(X, "ndim", 0) == 2 and not hasattr(X, "columns"):
-        raise ValueError(
-            "X is a single 2-D input. Wrap one trial as [X]; for univariate ones in rows "
-            "give how many frames each has, [X.shape[1]] * len(X)."
-        )
-    if _are_lengths(X):
-        return as_numbers(X, "The lengths", dtype=np.float64)
-    return np.array([len(x) for x in read_collection(X)[0]], dtype=np.float64)
-
-
-def _labels_of(X):
-    """Labels of trials, or tables that have them; None without any."""
-    if isinstance(X, pd.Series):
-        is_numbered = isinstance(X.index, pd.RangeIndex) or not X.index.is_unique
-        return None if is_numbered else X.index
-    if X is None or _are_lengths(X):
-        return None
-    sequences = as_collection(X)
-    are_tables = sequences and all(isinstance(x, pd.DataFrame) for x in sequences)
-    return sequences if are_tables else None
+    return to_frame(tables, trials=index)

@@ -16,6 +16,7 @@ from sklearn.utils._param_validation import Interval
 
 from ..body.limbs import parts_of_names, parts_of_poses
 from ..inputs.features import choose_features
+from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import (
     Features,
     Indexed,
@@ -38,8 +39,7 @@ from ..utils.parameters import validated_with_nested
 from .base import AnchoredSynchronizer
 from .dense import DenseSynchronizer
 from .learning import MOST_LEARNT, warp_in_portions
-from .match import Match, rates_of, timing_table
-from .training import with_confidence
+from .match import Match, timing_table
 
 __all__ = ["Lags", "PartSynchronizer"]
 
@@ -278,12 +278,11 @@ class PartSynchronizer(AnchoredSynchronizer):
         # Free of coupling, no part is drawn to the body, and its warp is not needed.
         even = np.tile(np.arange(self.n_frames_, dtype=np.float64), (len(trials), 1))
         matches = self._match_parts(trials, Match(even), self._warpers, free=True)
-        lengths, rates = [len(x) for x in trials], rates_of(X, frame_rate, unit)
-        offsets = {}
+        facts, offsets = TrialFacts.of(trials, frame_rate), {}
         for name, match in matches.items():
             usual = Match(np.broadcast_to(self._usual[name], match.times.shape))
-            offsets[name] = match.offsets_in(unit, lengths, rates)
-            offsets[name] -= usual.offsets_in(unit, lengths, rates)
+            offsets[name] = match.of_trials(facts).offsets_in(unit)
+            offsets[name] -= usual.of_trials(facts).offsets_in(unit)
         moving = [name for name, warper in self._warpers.items() if warper is not None]
         # What does not move has no lag.
         lags = [
@@ -295,13 +294,11 @@ class PartSynchronizer(AnchoredSynchronizer):
         values = np.stack(lags, axis=1)
         return Lags(values, [*self.parts_], unit, groups, people, trials.labels)
 
-    def _warp_part(self, trials, keyframes=None, frame_rate=None, confidence=None):
-        trials = with_confidence(trials, confidence)
-        body = self.match(trials, keyframes, frame_rate)
-        out = body.warp(trials)
-        for name, match in self._match_parts(trials, body, self.parts_).items():
+    def _warped(self, trials, match):
+        out = match.warp(trials)
+        for name, of_part in self._match_parts(trials, match, self.parts_).items():
             columns = self.parts_[name]
-            out[:, :, columns] = match.warp([x[:, columns] for x in trials])
+            out[:, :, columns] = of_part.warp([x[:, columns] for x in trials])
         return out
 
     def _match_parts(self, trials, body, names, free=False):
@@ -540,7 +537,7 @@ class Lags(NamedTuple):
             A row a trial and frame of the pattern, a column a part.
         """
         columns = {part: self.values[:, i] for i, part in enumerate(self.parts)}
-        return timing_table(columns, None, self.labels)
+        return timing_table(columns, self.labels)
 
     def __repr__(self):
         n_sequences, n_parts, n_frames = self.values.shape

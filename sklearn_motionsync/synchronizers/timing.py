@@ -232,10 +232,28 @@ class TimingChannel(
             ``(trial, frame)`` frame under ``set_output(transform="pandas")``.
         """
         check_is_fitted(self)
-        sync, params = self.synchronizer_, self._route("transform", params)
-        trials = sync.check_trials(X)
-        match = sync.match(trials, **params)
-        check_match(match, len(trials), self.n_frames_, type(sync).__name__)
+        trials = self.synchronizer_.check_trials(X)
+        match = self.synchronizer_.match(trials, **self._route("transform", params))
+        return self.transform_matched(trials, match)
+
+    def transform_matched(self, X: TrialsLike, match: Match) -> Transformed:
+        """Warp trials whose match is known, and append the offset.
+
+        Parameters
+        ----------
+        X : trials
+            As for ``match``, which was given the same.
+        match : Match
+            That of X.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features + 1)
+            What ``transform`` gives for X.
+        """
+        check_is_fitted(self)
+        trials = self.synchronizer_.check_trials(X)
+        check_match(match, len(trials), self.n_frames_, type(self.synchronizer_).__name__)
         curves = match.warp(trials)
         lengths = [len(x) for x in trials]
         timing = [match.offsets_in(self.unit, lengths, self.frame_rate)]

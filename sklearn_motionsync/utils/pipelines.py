@@ -2,13 +2,19 @@
 
 import inspect
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from sklearn.compose import ColumnTransformer
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 from sklearn.utils.validation import check_is_fitted
+
+from ..inputs.keyframes import Keyframes
+from ..inputs.resampling import as_frame_rates
+from ..inputs.trial_facts import TrialFacts
 
 __all__ = [
     "MissingMetadata",
@@ -20,12 +26,12 @@ __all__ = [
     "find_synchronizer",
     "flat_steps",
     "index_of_pattern",
+    "refuse_params",
     "route_to_synchronizer",
     "steps_to_fit",
     "takes_gaps",
     "transform_through",
     "union_transformers",
-    "with_frame_rate",
 ]
 
 
@@ -85,16 +91,36 @@ class Routed(NamedTuple):
         Checked: the methods of the synchronizer take them without checking again.
     params : dict
         Other arguments of its ``match``, such as ``keyframes``.
+    facts : TrialFacts
+        Of the trials as they were recorded.
     caller, hint : str
         As of `explain_missing`.
+    known : Match or None
+        That of these trials, if they were matched before.
     """
 
     before: Pipeline | None
     synchronizer: object
     trials: tuple
     params: dict
-    caller: str
-    hint: str
+    facts: TrialFacts
+    caller: str = "match"
+    hint: str = ""
+    known: object = None
+
+    @property
+    def steps(self):
+        """The steps before in order, and the synchronizer."""
+        return [*([] if self.before is None else flat_steps(self.before)), self.synchronizer]
+
+    @property
+    def keyframes(self):
+        """Key-frames that were given, as shares of the trials: a table by name, None without."""
+        given = self.params.get("keyframes")
+        if given is None:
+            return None
+        rows = Keyframes(given, len(self.trials), self.params.get("frame_rate"))
+        return pd.DataFrame(rows.shares(self.trials), columns=getattr(given, "columns", None))
 
     @property
     def takes_params(self):
@@ -103,8 +129,12 @@ class Routed(NamedTuple):
 
     def match(self):
         """The trials matched to the pattern."""
+        if self.known is not None:
+            return self.known
         with explain_missing(self.caller, self.hint):
-            return self.synchronizer.match(self.trials, **self.params)
+            match = self.synchronizer.match(self.trials, **self.params)
+        # What a synchronizer gives in place of a match is refused where it is used.
+        return match.of_trials(self.facts, self) if hasattr(match, "of_trials") else match
 
 
 def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
@@ -112,11 +142,12 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
 
     Parameters
     ----------
-    estimator : synchronizer, or Pipeline with one
+    estimator : synchronizer, Pipeline with one, or Match of the same trials
     X : trials, as the estimator takes them
     params : dict
         Other arguments by name, of ``match`` and of ``transform`` of the steps before; each method
-        is given those that it accepts. None is as not given.
+        is given those that it accepts. None is as not given. ``frame_rate`` is a fact of the
+        trials, with which key-frames are seconds.
     caller : str
         The function that the user called with (estimator, X), for messages.
     kind : class, default=None
@@ -135,6 +166,8 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     TypeError
         If no method accepts one of the params.
     """
+    if hasattr(estimator, "reached"):
+        return _of_match(estimator, X, params, caller, kind)
     before, synchronizer = (
         find_synchronizer(estimator) if kind is None else find_step(estimator, kind)
     )
@@ -143,17 +176,36 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     features = transform_through(before, X, params, caller, hint=hint, also=also)
     trials = synchronizer.check_trials(features)
     accepted = accepted_params(synchronizer.match, params)
-    return Routed(before, synchronizer, trials, accepted, caller, hint)
+    facts = TrialFacts.of(X, params.get("frame_rate"), checked=trials)
+    return Routed(before, synchronizer, facts.label(trials), accepted, facts, caller, hint)
 
 
-def with_frame_rate(params, frame_rate):
-    """Params of ``match``, by the frame rate that a caller needs for itself, too.
-
-    With a frame rate key-frames are seconds, in every function as in ``match``.
-    """
-    if frame_rate is None or params.get("keyframes") is None:
-        return params
-    return params | {"frame_rate": frame_rate}
+def _of_match(match, X, params, caller, kind):
+    """What reached the synchronizer that made a match of the trials X."""
+    reached = match.reached
+    if reached is None or not (kind is None or isinstance(reached.synchronizer, kind)):
+        wanted = "a synchronizer" if kind is None else f"a {kind.__name__}"
+        raise ValueError(
+            f"{caller} got a Match that is not by {wanted} in memory, which unpickled ones, those "
+            "of given warps and of trials that were read in parts are not: give the estimator, or "
+            "Match.from_estimator(estimator, X)."
+        )
+    beside = [name for name, value in params.items() if value is not None]
+    if beside and beside != ["frame_rate"]:
+        raise TypeError(
+            f"{caller} got {beside[0]!r} beside a Match, which was made with arguments of its own: "
+            f"give {beside[0]} to match, or the estimator to {caller}."
+        )
+    facts = TrialFacts.of(X, params.get("frame_rate"), checked=reached.trials)
+    if not np.array_equal(facts.lengths, match.facts.lengths):
+        raise ValueError(
+            f"{caller} got a Match of {len(match.times)} trials, and X are others: "
+            f"{len(facts.lengths)}, or of other lengths. Give the X that were matched."
+        )
+    if facts.frame_rates is None:
+        facts = facts._replace(frame_rates=match.facts.frame_rates)
+    known = match.of_trials(facts, reached)
+    return reached._replace(facts=facts, caller=caller, known=known)
 
 
 def transform_through(before, X, params, caller, *, hint="", also=()):
@@ -171,19 +223,26 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
     trials, as the last step gives them
     """
     methods = [] if before is None else [step.transform for step in flat_steps(before)]
-    takers = [*methods, *also]
+    refuse_params([*methods, *also], params, caller)
+    with explain_missing(caller, hint):
+        for method in methods:
+            X = method(X, **accepted_params(method, params))
+    return X
+
+
+def refuse_params(takers, params, caller):
+    """Refuse params of a caller that none of some methods accepts."""
     accepted = {name for method in takers for name in accepted_params(method, params)}
     for name, value in params.items():
-        if name not in accepted and value is not None:
+        if name == "frame_rate" and value is not None:
+            # A fact of the trials, which not every synchronizer needs to know.
+            as_frame_rates(value)
+        elif name not in accepted and value is not None:
             names = [f"{type(method.__self__).__name__}.{method.__name__}" for method in takers]
             raise TypeError(
                 f"{caller} got {name!r}, which is no argument of its own, and is not taken by "
                 f"{' or '.join(names) or 'a step before'}."
             )
-    with explain_missing(caller, hint):
-        for method in methods:
-            X = method(X, **accepted_params(method, params))
-    return X
 
 
 def accepted_params(method, params):
@@ -203,12 +262,19 @@ def accepted_params(method, params):
         return {name: value for each in accepted_by_each for name, value in each.items()}
     # A wrapper of a synchronizer passes on those that the synchronizer accepts.
     method = getattr(_unwrapped(owner), method.__name__, method)
-    # The first one is X.
-    _, *accepted = inspect.signature(method).parameters.values()
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
+    names = _names_beside_X(getattr(method, "__func__", method), owner is not None)
+    if names is None:
         return values
-    names = {parameter.name for parameter in accepted}
     return {name: value for name, value in values.items() if name in names}
+
+
+@lru_cache(maxsize=256)
+def _names_beside_X(function, is_method):
+    """Names of the parameters of a function behind X; None if it takes any."""
+    _, *others = list(inspect.signature(function).parameters.values())[is_method:]
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in others):
+        return None
+    return frozenset(parameter.name for parameter in others)
 
 
 def find_step(estimator, kind):

@@ -119,7 +119,7 @@ def test_events_that_some_trials_and_people_lack():
         ({"events": np.ones((3, 2))}, "events must be a list of 32 arrays"),
         ({"events": K.iloc[:, ::-1]}, "key-frames must be 5 increasing frames"),
         ({"unit": "hours"}, "unit must be one of"),
-        ({"unit": "seconds"}, "unit='seconds' needs frame_rate"),
+        ({"unit": "seconds"}, "Time in seconds needs frame_rate"),
         ({"level": 0}, "level must be a number"),
         ({"y": None, "covariate": True}, "y is needed"),
         ({"y": ["A"] * 30 + ["B"] * 2, "groups": None, "events": K.iloc[:31].reindex(K.index)},

@@ -397,7 +397,7 @@ GROUPS = ["a", "b"] * 8
             "n_permutations must be a whole number of at least 19",
         ),
         ({"y": GROUPS, "unit": "hours"}, "unit must be one of"),
-        ({"y": GROUPS, "unit": "seconds"}, "needs X and frame_rate"),
+        ({"y": GROUPS, "unit": "seconds"}, "Time in seconds needs frame_rate"),
         ({"y": GROUPS, "signals": [np.ones((5, 1))] * 3}, "one sequence for each of 16 trials"),
         ({"y": GROUPS, "signals": [np.full((5, 1), np.nan)] * 16}, "Trial 0, frame"),
         ({"y": GROUPS, "features": "knee"}, "knee"),

@@ -97,6 +97,11 @@ def test_tables_tell_their_frame_rate():
     lengths = list(map(len, X))
     expected = match.to_frame("seconds", lengths, rates)
     pd.testing.assert_frame_equal(match.to_frame("seconds", X), expected)
+    # It knows its trials; what was recorded with them, by frames of any rate, lasts as long.
+    pd.testing.assert_frame_equal(match.to_frame("seconds"), expected)
+    forces = [np.zeros((10 * n - 9, 1)) for n in lengths]
+    np.testing.assert_allclose(match.seconds(forces), match.seconds(), rtol=1e-12)
+    np.testing.assert_array_equal(match.frames(), match.frames(X))
     # One that is given counts.
     given = match.to_frame("seconds", lengths, 10)
     pd.testing.assert_frame_equal(match.to_frame("seconds", X, 10), given)
@@ -106,8 +111,9 @@ def test_tables_tell_their_frame_rate():
     long = to_frame(X[:3])
     np.testing.assert_allclose(Match(match.times[:3]).seconds(long)[:, -1], [0.58, 0.78, 0.98])
     for unknown in ([*X[:4], X[0].to_numpy()], [*X[:4], recorded.drop(index=5)], lengths):
-        for call in (match.seconds, partial(match.to_frame, "seconds")):
-            with pytest.raises(ValueError, match="needs X and frame_rate, which X does not tell"):
+        of_warps = Match(match.times)
+        for call in (of_warps.seconds, partial(of_warps.to_frame, "seconds")):
+            with pytest.raises(ValueError, match="needs frame_rate, .* which they do not tell"):
                 call(unknown)
 
 
