@@ -132,6 +132,7 @@ def compare_events(
     if study is None:
         return table
     units = study.units(of_people.fill(values))
+    _count_known(units, names, " whose trials are compared")
     rng, progress = check_random_state(random_state), Progress(None, 0)
     curves = [units[:, np.newaxis]]
     (family,) = families(study.design, curves, n_permutations, rng, progress=progress)
@@ -159,18 +160,23 @@ def _times_of_events(X, events, unit, frame_rate):
     return frames * scale, names
 
 
+def _count_known(values, names, where):
+    """In how many people each event is known: two or more."""
+    counts = (~np.isnan(values)).sum(axis=0)
+    k = int(counts.argmin())
+    if counts[k] < 2:
+        raise ValueError(
+            f"events: {names[k]!r} is known in {counts[k]} people{where}, and at least 2 are "
+            "needed. Leave it out."
+        )
+    return counts
+
+
 def _table_of_groups(of_people, values, names):
     """Mean, standard deviation and number of people by event and group."""
     table = pd.DataFrame(index=pd.Index(names, name="event", tupleize_cols=False))
     for label, means in zip(of_people.labels, of_people.means(values), strict=True):
-        counts = (~np.isnan(means)).sum(axis=0)
-        if counts.min() < 2:
-            k = int(counts.argmin())
-            where = f" of group {label!r}" if label else ""
-            raise ValueError(
-                f"events: {names[k]!r} is known in {counts[k]} people"
-                f"{where}, and at least 2 are needed. Leave it out."
-            )
+        counts = _count_known(means, names, f" of group {label!r}" if label else "")
         prefix = f"{label} " if label else ""
         table[f"{prefix}mean"] = np.nanmean(means, axis=0)
         table[f"{prefix}sd"] = np.nanstd(means, axis=0, ddof=1)

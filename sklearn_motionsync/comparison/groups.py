@@ -240,11 +240,11 @@ def compare_groups(
         unit=unit,
     )
     study = Study.of(y, groups, covariate=covariate, paired=paired, n=len(aligned.curves))
-    return compare_aligned(aligned, study, level, n_permutations, random_state, n_jobs, verbose)
+    return compare_aligned(aligned, study, random_state, level, n_permutations, n_jobs, verbose)
 
 
 def compare_aligned(
-    aligned, study, level=0.05, n_permutations=1999, random_state=0, n_jobs=None, verbose=0
+    aligned, study, random_state, level=0.05, n_permutations=1999, n_jobs=None, verbose=0
 ):
     """The comparison of trials that are matched already: `AlignedCurves`."""
     values = aligned.curves, aligned.offsets[:, :, np.newaxis], aligned.even

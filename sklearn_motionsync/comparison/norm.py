@@ -246,7 +246,7 @@ def _compare(aligned, study, level):
     joint = np.minimum(1, 2 * p.min(axis=1))
     columns = {"group": study.groups, "n_trials": counts, "p": joint}
     columns |= {"p_shape": p[:, 0], "p_timing": p[:, 1], "differs": joint <= level}
-    subject = pd.Index(study.labels, name="subject", tupleize_cols=False)
+    subject = pd.Index(study.labels, name="subject")
     verdicts = pd.DataFrame(columns, index=subject)
     names, units = [*aligned.names, "offset"], [*aligned.units, UNITS[aligned.unit]]
     return NormComparison(
@@ -309,9 +309,8 @@ def _largest_deviations(of_people, k, part):
     for i, x in enumerate(of_people):
         mean, std = _of_norm(np.delete(means, i, axis=0))
         # Means of k trials, of which each begins with another one.
-        n = len(x)
-        starts = range(n) if k < n else [0]
-        curves = [x[(np.arange(min(k, n)) + start) % n, :, part].mean(axis=0) for start in starts]
+        x = x[:, :, part]
+        curves = [np.roll(x, start, axis=0)[:k].mean(axis=0) for start in range(len(x))]
         z = np.abs((np.stack(curves) - mean) / std).max(axis=(1, 2))
         logs.append(np.log(np.maximum(z, np.finfo(float).tiny)))
         weights.append(np.full(len(z), 1 / len(z)))

@@ -78,9 +78,9 @@ class Study:
     def units(self, values):
         """Values (n_units, ...) of those of the trials; NaN where one of these is."""
         missing = np.isnan(values)
-        of_units = np.tensordot(self.maker, np.where(missing, 0.0, values), 1)
+        of_units = np.tensordot(self.maker, np.nan_to_num(values), 1)
         if missing.any():
-            of_units[np.tensordot(self.maker != 0, missing, 1) > 0] = np.nan
+            of_units[np.tensordot(self.maker != 0, missing, 1)] = np.nan
         return of_units
 
     @classmethod
@@ -102,10 +102,10 @@ class Study:
         labels = [str(label) for label in labels]
         if paired:
             return cls._of_pairs(codes, labels, persons, None if groups is None else names)
-        for person in range(persons.max() + 1):
+        for person, name in enumerate(names):
             if len(set(codes[persons == person])) > 1:
                 raise ValueError(
-                    f"groups: {names[person]!r} has trials of several labels in y. Set paired=True "
+                    f"groups: {name!r} has trials of several labels in y. Set paired=True "
                     "for two labels with the same people; otherwise each person has one label."
                 )
         maker = _means(persons)
@@ -199,7 +199,7 @@ class Study:
         # Welch's test, for groups that vary differently.
         shares = np.array([x.var(ddof=1) / len(x) for x in (a, b)])
         degrees = np.sum(shares**2 / [len(a) - 1, len(b) - 1])
-        freedom = shares.sum() ** 2 / degrees if degrees > 0 else len(a) + len(b) - 2
+        freedom = shares.sum() ** 2 / degrees if degrees else np.inf
         labels = [self.labels[low], self.labels[high]]
         return self._interval(b.mean() - a.mean(), np.sqrt(shares.sum()), freedom, what, labels)
 
@@ -278,8 +278,9 @@ class GroupsOfPeople:
         means = []
         for maker in self.makers:
             weights = np.tensordot(maker, is_known.astype(float), 1)
-            sums = np.tensordot(maker, np.where(is_known, values, 0.0), 1)
-            means.append(np.where(weights > 0, sums / np.where(weights > 0, weights, 1), np.nan))
+            sums = np.tensordot(maker, np.nan_to_num(values), 1)
+            unknown = np.full(sums.shape, np.nan)
+            means.append(np.divide(sums, weights, out=unknown, where=weights > 0))
         return means
 
     def fill(self, values):
@@ -418,14 +419,12 @@ def scaled(values, centred):
 
     What is not known (NaN) becomes the mean.
     """
-    is_known = ~np.isnan(values)
     if centred:
-        counts = np.maximum(is_known.sum(axis=0), 1)
-        values = values - np.where(is_known, values, 0).sum(axis=0) / counts
-    values = np.where(is_known, values, 0)
+        values = values - np.nanmean(values, axis=0)
+    values = np.nan_to_num(values)
     length = np.sqrt(np.square(values).sum(axis=0))
     varies = length > _VARIES * length.max(axis=0)
-    return np.where(varies, values / np.where(varies, length, 1), 0)
+    return np.divide(values, length, out=np.zeros_like(values), where=varies)
 
 
 def enhanced(deviates):

@@ -66,80 +66,151 @@ def test_as_many_people_of_the_norm_differ_as_the_level_says():
     assert 2 <= sum(wrong) <= 20
 
 
-def test_numbers_equal_a_slow_version(late):
-    gait, pipe = late
-    found = compared(gait, pipe, features=[1])
-    match = Match.from_estimator(pipe, gait.data)
-    offsets = match.offsets_in("percent")
-    people = list(dict.fromkeys(gait.person))
-    groups = dict(zip(gait.person, gait.group, strict=True))
-    trials = {p: offsets[gait.person == p] for p in people}
-    norm = [p for p in people if groups[p] == "A"]
+def root_mean_square(differences):
+    return np.sqrt(np.square(differences).mean(axis=0))
 
-    def reference(some):
+
+def test_numbers_equal_a_slow_version(late):
+    """A person of the norm has a single trial, and so have some of the subjects."""
+    gait, pipe = late
+    rare = [gait.person[0], *gait.person[gait.group == "B"][::4]]
+    keep = [k for k in range(len(gait.data)) if k % 2 == 0 or gait.person[k] not in rare]
+    X, person, group = [gait.data[k] for k in keep], gait.person[keep], gait.group[keep]
+    found = compare_to_norm(pipe, X, group, norm="A", groups=person, features=[1, 2])
+    match = Match.from_estimator(pipe, X)
+    warped, offsets = match.warp(X)[..., 1:3], match.offsets_in("percent")[..., np.newaxis]
+    everything = np.concatenate([warped, offsets], axis=2)
+    people = list(dict.fromkeys(person))
+    norm = [p for p in people if group[person == p][0] == "A"]
+    counts = found.verdicts["n_trials"]
+    assert counts.to_dict() == {p: np.sum(person == p) for p in people if p not in norm}
+    assert set(counts) == {1, 2}
+
+    def reference(trials, some):
         means = np.array([trials[p].mean(axis=0) for p in some])
         n = len(means)
         others = (means.sum(axis=0) - means) / (n - 1)
         squares = np.square(means - others).mean(axis=0)
-        variance = ((n - 1) * squares + 20 * squares.mean()) / (n + 19) * (1 + 1 / n)
-        spread = means.var()
-        return means.mean(axis=0), np.sqrt(np.maximum(variance, 1e-9 * spread))
+        variance = ((n - 1) * squares + 20 * squares.mean(axis=0)) / (n + 19) * (1 + 1 / n)
+        return means.mean(axis=0), np.sqrt(np.maximum(variance, 1e-9 * means.var(axis=(0, 1))))
 
-    logs = []
-    for p in norm:
-        mean, std = reference([other for other in norm if other != p])
-        logs.append(np.log(np.abs((trials[p].mean(axis=0) - mean) / std).max()))
-    n, freedom = len(logs), len(logs) + 2
-    scale = np.sqrt((np.var(logs) * n + 3 * 0.1) / freedom * (1 + 1 / n))
-    mean, std = reference(norm)
-    for subject, row in found.verdicts.iterrows():
-        z = np.abs((trials[subject].mean(axis=0) - mean) / std).max()
-        p = stats.t.sf((np.log(z) - np.mean(logs)) / scale, freedom)
-        assert row["p_timing"] == pytest.approx(p, rel=1e-6)
-    limit = np.exp(np.mean(logs) + stats.t.ppf(0.975, freedom) * scale)
-    np.testing.assert_allclose(found.limits[:, -1], limit)
+    def of_new_person(trials, k):
+        """Mean and scale of the logarithm of the largest deviation, of the mean of k trials."""
+        logs, weights, n = [], [], len(norm)
+        for p in norm:
+            mean, std = reference(trials, [other for other in norm if other != p])
+            m = len(trials[p])
+            for first in range(m):
+                some = [trials[p][(first + j) % m] for j in range(min(k, m))]
+                logs.append(np.log(np.abs((np.mean(some, axis=0) - mean) / std).max()))
+                weights.append(1 / m)
+        mean = np.average(logs, weights=weights)
+        variance = np.average((logs - mean) ** 2, weights=weights)
+        return mean, np.sqrt((variance * n + 3 * 0.1) / (n + 2) * (1 + 1 / n))
+
+    for what, part in (("shape", slice(0, 2)), ("timing", slice(2, 3))):
+        trials = {p: everything[person == p][..., part] for p in people}
+        mean, std = reference(trials, norm)
+        np.testing.assert_allclose(found.mean[:, part], mean)
+        np.testing.assert_allclose(found.std[:, part], std)
+        for i, (subject, row) in enumerate(found.verdicts.iterrows()):
+            curve = trials[subject].mean(axis=0)
+            np.testing.assert_allclose(found.curves[i][:, part], curve)
+            middle, scale = of_new_person(trials, row["n_trials"])
+            z = np.abs((curve - mean) / std).max()
+            p = stats.t.sf((np.log(z) - middle) / scale, len(norm) + 2)
+            assert row[f"p_{what}"] == pytest.approx(p, rel=1e-6)
+            limit = np.exp(middle + stats.t.ppf(0.975, len(norm) + 2) * scale)
+            np.testing.assert_allclose(found.limits[i, part], limit)
     # The profile: root mean squares of differences from the mean of the norm.
-    warped = match.warp(gait.data)[:, :, 1]
-    of = {p: warped[gait.person == p].mean(axis=0) for p in people}
-    middle = np.mean([of[p] for p in norm], axis=0)
-    for subject in found.verdicts.index:
-        row = found.profile.loc[(subject, "x1")]
-        assert row["aligned"] == pytest.approx(np.sqrt(np.square(of[subject] - middle).mean()))
-    even = np.array([np.interp(np.linspace(0, len(x) - 1, P), np.arange(len(x)), x[:, 1])
-                     for x in gait.data])  # fmt: skip
-    of = {p: even[gait.person == p].mean(axis=0) for p in people}
-    middle = np.mean([of[p] for p in norm], axis=0)
-    subject = found.verdicts.index[0]
-    row = found.profile.loc[(subject, "x1")]
-    assert row["linear"] == pytest.approx(np.sqrt(np.square(of[subject] - middle).mean()), rel=1e-3)
-    assert np.isnan(found.profile.loc[(subject, "offset"), "linear"])
+    even = [[np.interp(np.linspace(0, len(x) - 1, P), np.arange(len(x)), x[:, k]) for k in (1, 2)]
+            for x in X]  # fmt: skip
+    even = np.moveaxis(even, 1, 2)
+    for values, column, names in (
+        (everything, "aligned", ["x1", "x2", "offset"]), (even, "linear", ["x1", "x2"])
+    ):  # fmt: skip
+        of = {p: values[person == p].mean(axis=0) for p in people}
+        middle = np.mean([of[p] for p in norm], axis=0)
+        for subject in found.verdicts.index:
+            expected = root_mean_square(of[subject] - middle)
+            rows = found.profile.loc[[(subject, name) for name in names], column]
+            np.testing.assert_allclose(rows, expected, rtol=1e-3)
+            if column == "aligned":
+                each = [root_mean_square(of[p] - np.mean([of[q] for q in norm if q != p], axis=0))
+                        for p in norm]  # fmt: skip
+                np.testing.assert_allclose(found.profile.loc[subject, "norm"], np.median(each, 0))
+    assert found.profile["linear"].xs("offset", level="feature").isna().all()
+
+
+@pytest.mark.parametrize("study", ["late", "weak", "noise"])
+def test_departures_and_sentences_equal_a_slow_version(late, study):
+    if study == "noise":  # many departures, and a norm of three people
+        X = np.random.default_rng(0).standard_normal((6, 30, 9)).cumsum(axis=1)
+        X[4:] *= 4
+        sync = LinearSynchronizer(30).fit(X)
+        found = compare_to_norm(sync, X, [*"nnnpqq"], norm="n", level=0.9, unit="frames")
+    else:
+        found = compared(*(late if study == "late" else studied(amplitude=-25)), level=0.3)
+    rows = []
+    for i, (subject, curves) in enumerate(zip(found.verdicts.index, found.curves, strict=True)):
+        of_subject, z = [], (curves - found.mean) / found.std
+        for k, name in enumerate(found.features):
+            limit, frame = found.limits[i, k], 0
+            is_timing = k == len(found.features) - 1
+            words = ("later", "earlier") if is_timing else ("above", "below")
+            while frame < len(z):
+                first = frame
+                while frame < len(z) and abs(z[frame, k]) > limit / 2:
+                    frame += 1
+                frames = range(first, frame)
+                beyond = [f for f in frames if abs(z[f, k]) > limit]
+                if beyond:
+                    peak = max(frames, key=lambda f: abs(z[f, k]))
+                    of_subject.append(
+                        [subject, "timing" if is_timing else "shape", name]
+                        + [found.clock[f] for f in (beyond[0], beyond[-1], peak)]
+                        + [
+                            words[int(z[peak, k] < 0)],
+                            (curves - found.mean)[peak, k],
+                            found.units[k],
+                        ]
+                        + [z[peak, k]]
+                    )
+                frame += 1
+        rows += sorted(of_subject, key=lambda row: abs(row[-1]), reverse=True)[:5]
+        row = found.verdicts.iloc[i]
+        assert row["p"] == min(1, 2 * min(row["p_shape"], row["p_timing"]))
+        assert row["differs"] == (row["p"] <= found.level) == bool(of_subject)
+        norm = f"the norm of {found.n_people} people, p = {row['p']:.2g}"
+        sentence = f"{subject} stays within {norm}."
+        if of_subject:
+            _, what, name, _, _, peak, word, size, unit, _ = rows[-min(len(of_subject), 5)]
+            where = f" in {name}" * (what == "shape")
+            size = f"{abs(size):.3g} {unit}".rstrip()
+            time = "frames" if study == "noise" else "%"
+            sentence = f"{subject} differs from {norm}: {size} {word}{where}, at {peak:.3g} {time}."
+        assert found.describe(subject) == sentence
+    expected = pd.DataFrame(rows, columns=list(found.departures))
+    pd.testing.assert_frame_equal(found.departures, expected)
+    groups = {"late": ["B"] * 12, "weak": ["B"] * 12, "noise": ["p", "q", "q"]}[study]
+    assert found.verdicts["group"].tolist() == groups
+    n = len(set(expected["subject"]))
+    assert n > 0
+    words = f"{n} of {len(groups)} subjects {'differs' if n == 1 else 'differ'}"
+    assert found.describe() == f"{words} from the norm of {found.n_people} people."
+    assert study != "noise" or (expected.groupby("subject").size() == 5).any()
 
 
 def test_a_verdict_has_rows_just_if_it_differs(late):
-    found = compared(*late, level=0.3)
-    assert found.verdicts["differs"].mean() > 0
-    has_rows = found.verdicts.index.isin(found.departures["subject"])
-    np.testing.assert_array_equal(has_rows, found.verdicts["differs"])
+    found = compared(*late, level=0.3).verdicts
+    least = found["p"].min()
+    at_level = compared(*late, level=least)
+    assert at_level.verdicts["differs"].tolist() == (found["p"] == least).tolist()
+    assert "1 of 12 subjects differs from" in at_level.describe()
     within = compared(*late, level=1e-9)
     assert len(within.departures) == 0
     assert "0 of 12 subjects differ" in repr(within)
     assert "stays within the norm of 12 people" in within.describe("person1")
-
-
-def test_fewer_trials_are_compared_with_as_many(late):
-    """One trial varies more than the mean of two, and so do single trials of the norm."""
-    gait, pipe = late
-    keep = [k for k in range(len(gait.data)) if gait.group[k] == "A" or k % 2 == 0]
-    one = compare_to_norm(
-        pipe,
-        [gait.data[k] for k in keep],
-        gait.group[keep],
-        norm="A",
-        groups=gait.person[keep],
-    )
-    two = compared(gait, pipe)
-    assert (one.limits[0] > two.limits[0]).all()
-    np.testing.assert_allclose(one.std, two.std)
 
 
 def test_without_people_names_units_and_seconds():
@@ -164,6 +235,7 @@ def test_without_people_names_units_and_seconds():
         ({"norm": "C"}, r"norm='C' is none of the labels \['A', 'B'\] in y"),
         ({"y": ["A"] * 48}, "y: all labels are equal"),
         ({"y": ["A"] * 4 + ["B"] * 44}, "needs at least 3 people, got 2 in 'A'"),
+        ({"groups": ["a", "b"] * 24, "y": ["A", "B"] * 24}, "the same 2 sets of trials apart"),
         ({"groups": [0] * 48}, "groups: all labels are equal"),
         (
             {"y": ["A", "B"] * 24},
