@@ -68,18 +68,28 @@ def test_positions_are_those_given(tmp_path):
     assert data["names"] == list("abcde")
     assert data["shown"] == [0, 1, 2, 3, 4]
     assert "<title>Bends &amp; more</title>" in page.page
-    places = {name: skeleton.indices_of(name)[0] for name in ("left_knee", "left_ankle")}
+    assert data["alone"]
+    assert "To keep this file small" not in page.page
+    places = {name: skeleton.indices_of(name)[0] for name in ("left_hip", "right_hip", "head")}
     for x, points in zip(BENDS.data, positions_of(data), strict=True):
-        x = x.reshape(len(x), -1, 3)
-        assert len(points) == len(x)
+        x, joints = x.reshape(len(x), -1, 3), points[:, :15]
+        assert points.shape == (len(x), 16, 3)
+        np.testing.assert_array_equal(points[:, 15], points[:, places["head"]])
         # Turned about the vertical and moved: heights, and distances between joints, remain.
-        heights = x[..., 1] - x[..., 1].min()
-        shank = np.linalg.norm(x[:, places["left_knee"]] - x[:, places["left_ankle"]], axis=1)
-        near = np.abs(points[..., 1][:, :, None] - heights[:, None]).max(axis=0)
-        knee, ankle = (near[:, joint].argmin() for joint in places.values())
-        assert max(near[knee, places["left_knee"]], near[ankle, places["left_ankle"]]) < 1e-3
-        drawn = np.linalg.norm(points[:, knee] - points[:, ankle], axis=1)
-        np.testing.assert_allclose(drawn, shank, atol=1e-3)
+        np.testing.assert_allclose(joints[..., 1], x[..., 1] - x[..., 1].min(), atol=1e-3)
+        drawn, given = (
+            np.linalg.norm(x[:, :, np.newaxis] - x[:, np.newaxis], axis=-1) for x in (joints, x)
+        )
+        np.testing.assert_allclose(drawn, given, atol=1e-3)
+        # It faces the reader at first: its left hip is to the right of the other one.
+        across = points[0, places["left_hip"]] - points[0, places["right_hip"]]
+        assert across[0] > 0.99 * np.hypot(across[0], across[2])
+    pairs = {(child, parent) for child, parent in enumerate(skeleton.parents) if parent >= 0}
+    assert {(b, a) for _, bones in data["bones"] for a, b in bones} == pairs
+    for side, bones in data["bones"]:
+        of_side = [skeleton.joints[b].partition("_")[0] in (side, "head", "neck") for _, b in bones]
+        assert all(of_side)
+    assert data["dots"] == [15]
     assert data["durations"] == [(len(x) - 1) / 50 for x in BENDS.data]
     assert (data["seconds"], data["pace"]) == (True, 1)
     tau = np.array(whole_numbers(data["warps"], "<H")).reshape(5, 31) / 65535
@@ -122,13 +132,33 @@ def test_keyframes_are_marked_on_both_axes_of_time(tmp_path):
     assert (down["name"], up["name"]) == ("down", "up")
     last = np.array([len(x) - 1 for x in BENDS.data])
     assert down["own"] == [9 / last[0], 10 / last[1], 12 / last[2], 8 / last[3], None]
-    # Warped to the clock, the frame of most trials is the key-frame of theirs.
-    at = [np.interp(down["clock"] * 30, np.arange(31), tau) / 30 * n
-          for tau, n in zip(match.times, last, strict=True)]  # fmt: skip
-    early = [a < frame for a, frame in zip(at[:4], frames[:4, 0], strict=True)]
-    assert sum(early) == 2
+    # On the clock they are where the warp of their trial comes by, between two of its frames.
+    places = []
+    for tau, n, frame in zip(match.times, last, frames[:4, 0], strict=False):
+        p = max(p for p in range(30) if tau[p] / 30 * n <= frame)
+        before, after = tau[p : p + 2] / 30 * n
+        places.append((p + (frame - before) / (after - before)) / 30)
+    assert down["clock"] == pytest.approx(np.median(places))
+    # The first and the last frame are key-frames; of a third one nothing is known.
+    frames = np.column_stack([np.zeros(5), last, np.full(5, np.nan)])
+    marks = write(tmp_path, match=match, keyframes=frames).data["player"]["keyframes"]
+    assert [mark["clock"] for mark in marks] == [0, 1, None]
     (only,) = write(tmp_path, keyframes=frames[:, :1]).data["player"]["keyframes"]
     assert (only["name"], only["clock"]) == ("key-frame 0", None)
+
+
+def test_points_in_a_plane_and_as_many_trials_as_there_may_be(tmp_path):
+    rng = np.random.default_rng(0)
+    names = [f"j{k}_{axis}" for k in range(4) for axis in "xy"]
+    trials = [rng.standard_normal((2 + k, 8)) for k in range(24)]
+    data = write(tmp_path, [pd.DataFrame(x, columns=names) for x in trials], None).data["player"]
+    assert (data["points"], data["dims"], data["most"]) == (4, 2, 24)
+    assert data["shown"] == list(range(24))
+    for x, points in zip(trials, positions_of(data), strict=True):
+        x = x.reshape(-1, 4, 2)
+        between, given = np.diff(points, axis=1), np.diff(x, axis=1)
+        np.testing.assert_allclose(between, given, atol=1e-3)
+        np.testing.assert_allclose(points[..., 1], x[..., 1] - x[..., 1].min(), atol=1e-3)
 
 
 def test_points_without_bones_gaps_and_one_trial(tmp_path):
@@ -149,10 +179,24 @@ def test_long_trials_have_fewer_frames_and_the_page_names_it(tmp_path, monkeypat
     assert sum(data["counts"]) * data["points"] * 3 <= 5 * 20 * 14 * 3
     assert f"holds {max(data['counts'])} frames of longer trials" in page.page
     assert data["lengths"] == [len(x) for x in BENDS.data]
-    ends = positions_of(data)[0][[0, -1], :, 1]
+    fewer = positions_of(data)[0]
     monkeypatch.undo()
     whole = positions_of(write(tmp_path).data["player"])[0]
-    np.testing.assert_allclose(ends, whole[[0, -1], :, 1], atol=2e-4)
+    at = np.linspace(0, len(whole) - 1, len(fewer))
+    low = np.minimum(at.astype(int), len(whole) - 2)
+    share = (at - low)[:, np.newaxis, np.newaxis]
+    between = (1 - share) * whole[low] + share * whole[low + 1]
+    np.testing.assert_allclose(fewer, between, atol=2e-4)
+
+
+@pytest.mark.parametrize("most", [1, 9, 19, 20, 21, 31, 32, 100])
+def test_the_longest_trial_is_as_long_as_all_fit(tmp_path, monkeypatch, most):
+    monkeypatch.setattr(player, "MOST_COORDINATES", 16 * 3 * most)
+    X = [x[:n] for x, n in zip(BENDS.data, (3, 8, 12, 9), strict=False)]
+    totals = {n: sum(min(n, len(x)) for x in X) for n in range(2, 13)}
+    longest = max((n for n in totals if totals[n] <= most), default=2)
+    counts = write(tmp_path, X).data["player"]["counts"]
+    assert counts == [min(longest, len(x)) for x in X]
 
 
 def test_a_report_has_the_same_player(tmp_path):
@@ -167,6 +211,9 @@ def test_a_report_has_the_same_player(tmp_path):
 
 # -- what is refused --------------------------------------------------------------------------
 
+PLANE = pd.DataFrame(np.ones((9, 6)), columns=[f"j{k}_{axis}" for k in range(3) for axis in "xy"])
+SPACE = pd.DataFrame(np.ones((9, 6)), columns=[f"j{k}_{axis}" for k in range(2) for axis in "xyz"])
+
 
 @pytest.mark.parametrize(
     ("given", "error", "message"),
@@ -176,12 +223,10 @@ def test_a_report_has_the_same_player(tmp_path):
         ({"names": ["a"]}, ValueError, "names must be a list of text, one for each of the 5"),
         ({"match": Match([[0, 1, 2]])}, ValueError, "match must be of the 5 trials of X"),
         ({"match": DenseSynchronizer()}, ValueError, "not fitted"),
+        ({"X": [PLANE, SPACE], "skeleton": None}, ValueError, r"Trial 1 has \(2, 3\) points and"),
         ({"keyframes": [[3]]}, ValueError, r"list of 5 arrays .*, one a trial"),
-        (
-            {"keyframes": [[3]] * 4 + [[99]]},
-            ValueError,
-            "Trial 4: key-frames .* between 0 and 39, both included",
-        ),
+        ({"keyframes": [[3]] * 4 + [[len(BENDS.data[4])]]}, ValueError, "Trial 4: key-frames must"),
+        ({"keyframes": [[3]] * 4 + [[-1]]}, ValueError, "and 39, both included, .* got"),
         ({"skeleton": "acclaim"}, ValueError, "skeleton must be a Skeleton"),
         ({"frame_rate": 0}, ValueError, "frame_rate"),
         ({"X": []}, ValueError, "0 trials"),

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import sys
+from html import escape
 from html.parser import HTMLParser
 from operator import itemgetter
 
@@ -13,6 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_rgba_array
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
 from sklearn_motionsync import (
@@ -77,12 +79,49 @@ class Text(HTMLParser):
     def table(self, name):
         return pd.read_csv(io.StringIO(self.data["files"][f"{name}.csv"]))
 
+    def rows(self, caption):
+        """The texts in the cells of a table of the page, its heads first."""
+        _, _, after = self.page.partition(f"<figcaption>{escape(caption)}</figcaption>")
+        rows = re.findall("<tr>(.*?)</tr>", after.partition("</table>")[0])
+        return [re.findall("<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows]
+
+
+def capture_figures(patch):
+    """The list that will hold the figures of reports."""
+    figures, picture = [], report.picture
+    patch.setattr(
+        report, "picture", lambda figure, text: (figures.append(figure), picture(figure, text))[1]
+    )
+    return figures
+
+
+def ys(lines):
+    return np.array([path.vertices[:, 1] for path in lines.get_paths()])
+
+
+def evenly(X, n):
+    """Trials (n_sequences, n, n_features) after linear normalisation."""
+    return np.array(
+        [[np.interp(np.linspace(0, len(x) - 1, n), range(len(x)), column) for column in x.T]
+         for x in X]
+    ).transpose(0, 2, 1)  # fmt: skip
+
+
+def assert_numbers(texts, values):
+    """Three digits of the largest number are shown."""
+    np.testing.assert_allclose([float(text) for text in texts], values, atol=0.006 * max(
+        map(abs, values)))  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def groups(tmp_path_factory):
     path = tmp_path_factory.mktemp("groups") / "report.html"
     out = {"walk 99": "it was cut off", 7: "no force plate"}
-    return Text(write_report(path, SYNC, TRIALS, **GIVEN, left_out=out, title="Gait"))
+    with pytest.MonkeyPatch.context() as patch:
+        figures = capture_figures(patch)
+        text = Text(write_report(path, SYNC, TRIALS, **GIVEN, left_out=out, title="Gait"))
+    text.figures = figures
+    return text
 
 
 def test_the_set_and_what_was_left_out(groups):
@@ -105,11 +144,18 @@ def test_tables_hold_the_numbers_of_the_match(groups):
     offsets = match.offsets_in("percent")
     timing = groups.table("timing")
     assert len(timing) == 16 * 51
+    index = ["trial", "group", "person", "frame of the pattern", "time of the pattern (%)"]
+    assert list(timing) == [*index, "offset (%)", "frame of the trial", "rate"]
+    assert timing["trial"].tolist() == [f"walk {k}" for k in range(16) for _ in range(51)]
+    assert timing["frame of the pattern"].tolist() == [*range(51)] * 16
+    np.testing.assert_allclose(timing[index[-1]], 2 * timing["frame of the pattern"])
+    np.testing.assert_allclose(timing["rate"], match.rates.ravel(), rtol=1e-5)
     np.testing.assert_allclose(timing["offset (%)"], offsets.ravel(), rtol=1e-5)
     frames = timing["frame of the trial"].to_numpy().reshape(16, 51)
     np.testing.assert_allclose(frames, match.frames(TRIALS), rtol=1e-5)
     curves = groups.table("aligned_curves")
-    assert list(curves)[-4:] == [
+    assert list(curves) == [
+        *index,
         "hip_flexion (deg)",
         "knee_flexion (deg)",
         "ankle_dorsiflexion (deg)",
@@ -119,11 +165,91 @@ def test_tables_hold_the_numbers_of_the_match(groups):
     np.testing.assert_allclose(curves.iloc[:, -4:], expected, rtol=1e-4, atol=1e-9)
     assert curves["group"].tolist() == np.repeat(GAIT.group, 51).tolist()
     trials = groups.table("trials")
-    worst = np.abs(offsets).max(axis=1).argmax()
-    np.testing.assert_allclose(
-        trials["mean absolute offset (%)"], np.abs(offsets).mean(axis=1), rtol=1e-5
+    columns = "mean absolute offset (%)", "largest offset (%)", "at (%)"
+    known = ["trial", "group", "person", "frames", "seconds"]
+    assert list(trials) == [*known, *columns, "pattern", "doubtful"]
+    at = np.abs(offsets).argmax(axis=1)
+    numbers = np.abs(offsets).mean(axis=1), offsets[range(16), at], 2.0 * at
+    np.testing.assert_allclose(trials[list(columns)].T, numbers, rtol=1e-5)
+    heads, *rows = groups.rows("Offsets of trials")
+    assert heads == [*known, *columns]
+    assert [row[:4] for row in rows] == trials[known[:4]].astype(str).to_numpy().tolist()
+    for texts, values in zip(list(zip(*rows, strict=True))[5:], numbers, strict=True):
+        assert_numbers(texts, values)
+    worst = np.abs(numbers[1]).argmax()
+    words = f"{page.number(abs(numbers[1][worst]))} % " + (
+        "later" if numbers[1][worst] > 0 else "earlier"
     )
-    assert f"The largest offset is that of trial walk {worst}:" in groups.text
+    assert (
+        f"The largest offset is that of trial walk {worst}: {words} than the pattern, at "
+        f"{page.number(2 * at[worst])} %."
+    ) in groups.text
+    heads, *rows = groups.rows("Offsets of groups")
+    assert heads == ["group", *columns, "of trial"]
+    of = [np.flatnonzero(GAIT.group == label) for label in "AB"]
+    first = [k[np.abs(numbers[1][k]).argmax()] for k in of]
+    assert [[row[0], row[-1]] for row in rows] == [
+        [label, f"walk {k}"] for label, k in zip("AB", first, strict=True)
+    ]
+    means = [numbers[0][k].mean() for k in of]
+    for texts, values in zip(
+        list(zip(*rows, strict=True))[1:4], (means, numbers[1][first], numbers[2][first]),
+        strict=True,
+    ):  # fmt: skip
+        assert_numbers(texts, values)
+
+
+def test_spreads_are_those_of_trials_before_and_after(groups):
+    warped = Match.from_estimator(SYNC, TRIALS).warp(GAIT.data)
+    spreads = [np.sqrt(x.var(axis=0).mean(axis=0)) for x in (evenly(GAIT.data, 51), warped)]
+    left = 100 * spreads[1] / spreads[0]
+    assert (
+        f"Of the standard deviation between time-normalised trials, {left.min():.0f} to "
+        f"{left.max():.0f} % is left after alignment."
+    ) in groups.text
+    heads, *rows = groups.rows("Standard deviation between trials")
+    assert heads == ["signal", "time-normalised", "aligned", "left (%)"]
+    names, *columns = zip(*rows, strict=True)
+    assert names[0] == "hip_flexion (deg)"
+    # Signals have units of their own: three digits of each.
+    for texts, values in zip(columns[:2], spreads, strict=True):
+        assert list(texts) == [page.number(value) for value in values]
+    assert_numbers(columns[2], left)
+
+
+def test_figures_show_the_curves_and_offsets(groups):
+    before_and_after, timing, _ = groups.figures
+    match = Match.from_estimator(SYNC, TRIALS)
+    warped, even, offsets = (
+        match.warp(GAIT.data),
+        evenly(GAIT.data, 51),
+        match.offsets_in("percent"),
+    )
+    panels = before_and_after.axes
+    assert len(panels) == 8
+    for k in range(4):
+        for axis, values in zip(panels[2 * k : 2 * k + 2], (even, warped), strict=True):
+            (lines,) = axis.collections
+            np.testing.assert_allclose(ys(lines), values[..., k])
+            np.testing.assert_allclose(lines.get_paths()[0].vertices[:, 0], np.linspace(0, 100, 51))
+        pattern = panels[2 * k + 1].lines[-1].get_ydata()
+        np.testing.assert_array_equal(pattern, warped[SYNC[-1].pattern_index_, :, k])
+    assert panels[-2].get_xlabel() == panels[-1].get_xlabel() == "% of the pattern"
+    assert panels[1].get_title() == "aligned, thick: group means\nblack: the pattern"
+    (axis,) = timing.axes
+    (lines,) = axis.collections
+    np.testing.assert_allclose(ys(lines), offsets)
+    *means, zero = axis.lines
+    assert np.unique(zero.get_ydata()).tolist() == [0]
+    colors = [mean.get_color() for mean in means]
+    for mean, label in zip(means, "AB", strict=True):
+        np.testing.assert_allclose(mean.get_ydata(), offsets[GAIT.group == label].mean(axis=0))
+    expected = to_rgba_array([colors["AB".index(label)] for label in GAIT.group])[:, :3]
+    np.testing.assert_array_equal(lines.get_colors()[:, :3], expected)
+    assert axis.get_xlim() == (0, 100)
+    assert axis.get_ylabel() == "later than\nthe pattern (%)"
+    assert axis.get_subplotspec().get_geometry() == (1, 1, 0, 0)
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["mean of A", "mean of B"]
 
 
 def test_the_test_is_that_of_compare_groups(groups):
@@ -134,23 +260,43 @@ def test_the_test_is_that_of_compare_groups(groups):
         groups.table("clusters"), found.clusters, rtol=1e-4, check_dtype=False
     )
     np.testing.assert_allclose(groups.table("p_values")["p"], found.to_frame()["p"], rtol=1e-4)
-    assert "B later than A" in groups.text
+    heads, *rows = groups.rows("Where they differ")
+    assert heads[:6] == ["differs in", "signal", "from (%)", "to (%)", "direction", "size"]
+    assert heads[6:] == ["95\u00a0% from", "95\u00a0% to", "unit", "p"]
+    columns = list(zip(*rows, strict=True))
+    for k, name in {0: "what", 1: "feature", 4: "direction", 8: "unit"}.items():
+        assert list(columns[k]) == found.clusters[name].tolist()
+    for k, name in {2: "start", 3: "end", 5: "size", 6: "lower", 7: "upper", 9: "p"}.items():
+        assert_numbers(columns[k], found.clusters[name])
+    assert [[test, differs] for test, _, differs in groups.rows(
+        "Probability of such differences by chance")[1:]] == [
+        ["joint", "yes"], ["shape", "no"], ["timing", "yes"], ["linear", "yes"]]  # fmt: skip
     assert any(found.describe() in image["alt"] for image in groups.images)
     assert len(groups.images) == 3
     for image in groups.images:
         assert base64.b64decode(image["src"].removeprefix("data:image/png;base64,"))[1:4] == b"PNG"
 
 
-def test_without_groups_there_is_no_test(tmp_path):
-    sync = LinearSynchronizer(20).fit(GAIT.data)
-    page = Text(write_report(tmp_path / "a.html", sync, GAIT.data, features=0))
+def test_without_groups_there_is_no_test(tmp_path, monkeypatch, capsys):
+    sync, figures = LinearSynchronizer(20).fit(GAIT.data), capture_figures(monkeypatch)
+    others = [x for k, x in enumerate(GAIT.data) if k != sync.pattern_index_]
+    page = Text(write_report(tmp_path / "a.html", sync, others, features=0))
     assert page.headings == ["The set", "Before and after", "Timing", "Doubtful trials"]
-    assert "16 trials, on 20 frames." in page.text
+    assert "15 trials, on 20 frames. The pattern is none of these trials." in page.text
     assert "frames, mean" in page.text
     assert set(page.data["files"]) == {"aligned_curves.csv", "trials.csv", "timing.csv"}
     assert page.data["player"] is None
     assert 'id="stage"' not in page.page
     assert "Aligned trials" in page.text
+    assert "trials, 100 % is left after alignment." in page.text
+    assert page.rows("Offsets of groups") == []
+    assert "one of every" not in page.text
+    before_and_after, timing = figures
+    assert before_and_after.axes[1].get_title() == "aligned\nblack: their mean"
+    mean = evenly(others, 20)[..., 0].mean(axis=0)
+    np.testing.assert_allclose(before_and_after.axes[1].lines[-1].get_ydata(), mean)
+    assert timing.axes[0].get_legend().get_texts()[0].get_text() == "their mean"
+    assert capsys.readouterr().out == ""
 
 
 def test_a_covariate_takes_the_place_of_groups(tmp_path):
@@ -169,6 +315,7 @@ def test_a_covariate_takes_the_place_of_groups(tmp_path):
     assert "Covariate" in page.headings
     assert "Regression, 8 people" in page.text
     assert page.table("trials")["covariate"].tolist() == age
+    assert page.rows("Offsets of trials")[0][:4] == ["trial", "person", "frames", "seconds"]
 
 
 def test_rows_seconds_and_synchronizers_that_do_not_tell(tmp_path):
@@ -182,9 +329,19 @@ def test_rows_seconds_and_synchronizers_that_do_not_tell(tmp_path):
     assert page.table("timing")["offset (s)"].abs().max() == 0
     one = Text(write_report(tmp_path / "b.html", sync, rows[:1]))
     assert "1 trial, on 20 frames." in one.text
+    assert "Of the standard deviation" not in one.text
+    assert one.rows("Trials and their lengths")[1] == ["1", "40.0", ""]
+    two = [rows[0, :, np.newaxis], rows[1, :30, np.newaxis]]
+    sync = LinearSynchronizer(20).fit(two)
+    two = Text(write_report(tmp_path / "b.html", sync, two, unit="frames"))
+    assert two.rows("Trials and their lengths")[1] == ["2", "35.0", f"{np.sqrt(50):.2f}"]
+    assert list(two.table("timing")) == [
+        "trial", "frame of the pattern", "offset (frames)", "frame of the trial", "rate"
+    ]  # fmt: skip
 
 
-def test_keyframes_and_features(tmp_path):
+def test_keyframes_and_features(tmp_path, monkeypatch):
+    figures = capture_figures(monkeypatch)
     sync = DenseSynchronizer(51).fit(GAIT.data, keyframes=GAIT.keyframes)
     events = pd.DataFrame(GAIT.keyframes, columns=GAIT.keyframe_names)
     given = {"keyframes": events, "features": ["hip_flexion"], "signals": TRIALS}
@@ -193,18 +350,34 @@ def test_keyframes_and_features(tmp_path):
     expected = match.offsets_in("percent").ravel()
     np.testing.assert_allclose(page.table("timing")["offset (%)"], expected, rtol=1e-5)
     assert list(page.table("aligned_curves"))[-1] == "hip_flexion (deg)"
-    wide = [np.repeat(x, 2, axis=1) for x in GAIT.data]
-    page = Text(write_report(tmp_path / "a.html", sync, GAIT.data, signals=wide, keyframes=events))
-    assert "The figure shows 4 of 8 signals." in page.text
+    # Key-frames have names and lines, behind the curve of the pattern and before that of the mean.
+    share = GAIT.keyframes[0] / (len(GAIT.data[0]) - 1)
+    at = np.interp(50 * share, match.times[0], 2 * np.arange(51))
+    for figure, lines in zip(figures, (slice(1, None), slice(2, None)), strict=True):
+        axis = figure.axes[-1]
+        assert [text.get_text() for text in axis.texts] == GAIT.keyframe_names
+        drawn = [line.get_xdata()[0] for line in axis.lines[lines]]
+        np.testing.assert_allclose(drawn, at, atol=1)
+    # One of seven signals is the same in all trials.
+    wide = [np.column_stack([x, x[:, :2], np.ones(len(x))]) for x in GAIT.data]
+    given = {"signals": wide, "keyframes": events}
+    page = Text(write_report(tmp_path / "a.html", sync, GAIT.data, **given))
+    assert "The figure shows 4 of 7 signals." in page.text
+    assert page.rows("Standard deviation between trials")[-1] == ["x6", "0", "0", ""]
+    page = Text(write_report(tmp_path / "a.html", sync, GAIT.data, **given, features=range(6)))
+    assert "The figure shows" not in page.text
+    assert [len(figure.axes) for figure in figures[2::2]] == [8, 12]
 
 
 def test_doubtful_trials_come_with_reasons(tmp_path):
     bad = [*GAIT.data, np.concatenate([GAIT.data[0]] * 2)]
     sync = DenseSynchronizer(51).fit(GAIT.data)
     page = Text(write_report(tmp_path / "a.html", sync, bad, features=0))
-    table = page.table("doubtful")
-    assert table["trial"].tolist() == [16]
-    assert "no warp explains" in page.text
+    reasons = Match.from_estimator(sync, bad).reasons
+    rows = [[str(k), escape(reason)] for k, reason in enumerate(reasons) if reason]
+    assert page.rows("Look at 1 trial before using the warps") == [["trial", "reason"], *rows]
+    assert "no warp explains" in rows[0][1]
+    assert page.table("doubtful")["trial"].tolist() == [16]
     assert page.table("trials")["doubtful"].tolist() == [False] * 16 + [True]
 
 
@@ -241,34 +414,88 @@ def test_bodies_are_those_that_reach_the_step_with_a_skeleton(tmp_path):
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(np.inf, "inf"), (-np.inf, "-inf"), (np.nan, ""), (-0.0, "0"), (2.5, "2.50")],
-)
+    [
+        ([np.inf], "inf"), ([-np.inf], "-inf"), ([np.nan], ""), ([-0.0], "0"), ([2.5], "2.50"),
+        ([0.1234], "0.123"), ([0.5, 2], "0.50"), ([-1.0, 1000.0], "-1"), ([1234.0], "1234"),
+        ([100.0], "100"), ([1.2e-9], "0.000000"), ([1.234e-4], "0.000123"),
+    ],
+)  # fmt: skip
 def test_numbers_of_the_page(value, text):
-    assert page.number(value) == text
+    assert page.number(*value) == text
 
 
-def test_sizes_are_limited_and_the_page_names_it(tmp_path, monkeypatch):
-    pipe = make_pipeline(DirectionCosines(BENDING.skeleton), LinearSynchronizer(30))
-    pipe.fit(BENDING.data)
-    monkeypatch.setattr(report, "MOST_NUMBERS", 6 * 30 * 2)
-    page = Text(write_report(tmp_path / "a.html", pipe, BENDING.data, features=0))
-    step = tables_step(page)
-    assert f"one of every {step} frames" in page.text
+def test_cells_and_links_of_the_page():
+    table = pd.DataFrame(
+        {"name": ["a<b", "c"], "count": [1200, 3], "one": [0.012345, 100], "ok": [True, False]}
+    )
+    table.insert(3, "each", table["one"])
+    text = page.table_of(table, "One", ("each",))
+    cells = [
+        f"<td>{name}</td>"
+        + "".join(f'<td class="n">{number}</td>' for number in numbers)
+        + f"<td>{ok}</td>"
+        for name, numbers, ok in (
+            ("a&lt;b", ("1200", "0", "0.0123"), "yes"),
+            ("c", ("3", "100", "100"), "no"),
+        )
+    ]
+    assert re.findall("<tr>(.*?)</tr>", text)[1:] == cells  # fmt: skip
+    two = page.Page()
+    two.add("First", "text")
+    assert "<nav" not in two.render("title", "version")
+    two.add("Nothing", "", "")
+    two.add("Second & last", "text")
+    links = re.findall('<li><a href="#(.*?)">(.*?)</a>', two.render("title", "version"))
+    assert links == [("section0", "First"), ("section1", "Second &amp; last")]
+
+
+def test_tables_with_a_row_a_frame_have_a_limit_and_the_page_names_it(tmp_path, monkeypatch):
+    sync = LinearSynchronizer(30).fit(GAIT.data)
+    # Five numbers a frame, of 16 trials on 30 frames: every other frame.
+    monkeypatch.setattr(report, "MOST_NUMBERS", 5 * 16 * 15)
+    page = Text(write_report(tmp_path / "a.html", sync, GAIT.data, features=1))
+    assert "one of every 2 frames" in page.text
+    timing, curves = page.table("timing"), page.table("aligned_curves")
+    for table in (timing, curves):
+        assert table["frame of the pattern"].tolist() == [*range(0, 30, 2)] * 16
+    match = sync.match(GAIT.data)
+    frames = match.frames(GAIT.data)[:, ::2].ravel()
+    np.testing.assert_allclose(timing["frame of the trial"], frames, rtol=1e-5)
+    np.testing.assert_allclose(timing["rate"], match.rates[:, ::2].ravel())
+    np.testing.assert_allclose(curves["x1"], evenly(GAIT.data, 30)[:, ::2, 1].ravel(), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "chosen", "shown"),
+    [(0, [0, 1, 2], [0, 1]), (4, [0, 1, 4], [0, 2]), (5, [0, 1, 2], [0, 1])],
+)
+def test_the_player_of_a_report_holds_the_pattern_and_the_first_trials(
+    tmp_path, monkeypatch, pattern, chosen, shown
+):
+    steps = DirectionCosines(BENDING.skeleton), DenseSynchronizer(20, pattern=pattern)
+    pipe = make_pipeline(*steps).fit(BENDING.data)
+    X, given = BENDING.data[:5], {"features": 0, "frame_rate": 10}
+    # 25 frames of 3 trials with 16 points each.
+    monkeypatch.setattr(player, "MOST_COORDINATES", 25 * 3 * 16 * 3)
+    page = Text(write_report(tmp_path / "a.html", pipe, X, **given))
+    data = page.data["player"]
+    names = [f"{k} (pattern)" if k == pattern else str(k) for k in chosen]
+    assert (data["names"], data["shown"], data["alone"]) == (names, shown, False)
+    assert data["durations"] == [(len(X[k]) - 1) / 10 for k in chosen]
+    assert "The player holds 3 trials of 5." in page.text
     monkeypatch.setattr(player, "MOST_COORDINATES", 1)
-    page = Text(write_report(tmp_path / "a.html", pipe, BENDING.data, features=0))
-    assert len(page.data["player"]["names"]) == 2
-    assert "The player holds 2 trials of 6." in page.text
-
-
-def tables_step(page):
-    return int(np.diff(page.table("timing")["frame of the pattern"].unique())[0])
+    two = Text(write_report(tmp_path / "a.html", pipe, X, **given)).data["player"]
+    assert (two["names"], two["counts"]) == ([names[0], names[shown[1]]], [2, 2])
+    one = Text(write_report(tmp_path / "a.html", pipe, [X[3]], **given))
+    assert (one.data["player"]["names"], one.data["player"]["shown"]) == (["0"], [0])
+    assert "The player holds" not in one.text
 
 
 # -- the file -------------------------------------------------------------------------------
 
 
 def test_what_users_give_is_text_and_no_markup(tmp_path):
-    evil = "</script><script>alert(\"x\")</script> & 'quotes' <b>"
+    evil = "</script><script>alert(\"é\")</script> & 'quotes' <b>"
     tables = [x.rename(columns={"hip_flexion": evil}) for x in TRIALS]
     for k, x in enumerate(tables):
         x.attrs["trial"] = f"{k} {evil}"
@@ -291,6 +518,7 @@ def test_what_users_give_is_text_and_no_markup(tmp_path):
     assert scripts == [{"type": "application/json", "id": "data"}, {}]
     assert "b" not in [tag for tag, _ in page.tags]
     assert page.text.startswith(evil)
+    assert "\\u00e9" not in page.page
     assert page.table("left_out")["reason"].tolist() == [evil]
     assert page.table("trials")["trial"][3] == f"3 {evil}"
     assert evil in list(page.table("aligned_curves"))[-1]
