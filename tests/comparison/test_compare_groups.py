@@ -1,6 +1,6 @@
 """compare_groups: statistics against SciPy and slow versions, answers, designs, refusals."""
 
-from itertools import permutations, product
+from itertools import groupby, permutations, product
 from types import SimpleNamespace
 
 import numpy as np
@@ -125,40 +125,49 @@ def test_deviates_have_the_tail_probabilities_of_the_tests():
     assert deviates(three, np.tile([0.0, 1, 2, 3, 4], 3) + 0.01 * groups) == 0
 
 
-def separation(values, groups):
-    """Variance between groups of which each counts as often as it has units."""
-    return -sum(values[groups == k].var() * np.sum(groups == k) for k in set(groups))
+def of_all_arrangements(values, y):
+    """How much values differ between groups, with a covariate, or from 0 (None)."""
+    if y is None:
+        signs = product([1, -1], repeat=len(values))
+        return np.array([abs(values @ one) for one in signs])
+    orders = [list(order) for order in permutations(range(len(y)))]
+    if y.dtype.kind == "f":
+        y = y - y.mean()
+        return np.array([abs(values @ y[order]) for order in orders])
+    within = [
+        sum(values[groups == k].var() * np.sum(groups == k) for k in set(y))
+        for groups in (y[order] for order in orders)
+    ]
+    return -np.array(within)
 
 
 @pytest.mark.parametrize(
-    ("y", "statistic"),
+    "y",
     [
-        (np.array([0, 0, 0, 1, 1, 1, 1]), separation),
-        (np.array([0, 0, 1, 1, 2, 2, 2]), separation),
-        (np.array([1.0, 2, 2, 4, 5, 7, 9]), lambda values, y: abs(np.corrcoef(values, y)[0, 1])),
-        (None, None),
+        [0, 0, 1, 1], [0, 0, 0, 1, 1], [0, 0, 0, 1, 1, 1, 1], [0, 0, 1, 1, 2, 2],
+        [0, 0, 1, 1, 2, 2, 2], [1.0, 2, 3, 4], [1.0, 2, 3, 7], [1.0, 1, 2, 5],
+        [1.0, 2, 2, 4, 5, 7, 9], None,
     ],
-    ids=["two groups", "three groups", "a covariate", "pairs"],
-)
-def test_p_of_one_value_is_the_share_of_all_arrangements(y, statistic):
+)  # fmt: skip
+def test_p_of_one_value_and_the_smallest_are_shares_of_all_arrangements(y):
     rng = np.random.default_rng(1)
-    values, given = rng.standard_normal(7), {"groups": None, "paired": y is None}
     if y is None:
-        values += 0.6
-        given |= {"groups": np.repeat(range(7), 2), "y": [0, 1] * 7, "covariate": False}
-        arranged = [abs(values @ signs) for signs in product([1, -1], repeat=7)]
-        values = np.column_stack([np.ones(7), 1 + values]).ravel()
+        values, given = 0.6 + rng.standard_normal(7), {"y": [0, 1] * 7, "paired": True}
+        given |= {"groups": np.repeat(range(7), 2), "covariate": False, "n": 14}
+        of_trials, extreme = np.column_stack([np.ones(7), 1 + values]).ravel(), np.ones(7)
     else:
-        values += 2 * y / y.max()
-        given |= {"y": y.tolist(), "covariate": y.dtype.kind == "f"}
-        arranged = [statistic(values, y[list(order)]) for order in permutations(range(7))]
-    exact = np.mean(np.array(arranged) >= arranged[0] - 1e-9)
-    study, draws = Study.of(**given, n=len(values)), np.random.RandomState(0)
-    curve, quiet = study.units(values)[:, np.newaxis, np.newaxis], Progress(None, 0)
-    (family,) = families(study.design, [curve], 9999, draws, progress=quiet)
-    assert 0.01 < exact < 0.3
-    assert family.p_value == pytest.approx(exact, abs=4 * np.sqrt(exact * (1 - exact) / 1e4))
-    assert len(family.ranks) == 10000
+        given = {"y": y, "covariate": y[0] == 1, "paired": False, "groups": None, "n": len(y)}
+        y, extreme = np.array(y), np.array(y)
+        of_trials = values = rng.standard_normal(len(y)) + 2 * y / y.max()
+    arranged = of_all_arrangements(values, y)
+    exact = np.mean(arranged >= arranged[0] - 1e-9)
+    study, draws = Study.of(**given), np.random.RandomState(0)
+    curve, quiet = study.units(of_trials)[:, np.newaxis, np.newaxis], Progress(None, 0)
+    (family,) = families(study.design, [curve], 4999, draws, progress=quiet)
+    assert family.p_value == pytest.approx(exact, abs=4 * np.sqrt(exact * (1 - exact) / 5e3))
+    assert len(family.ranks) == 5000
+    arranged = of_all_arrangements(extreme, y)
+    assert study.smallest_p == pytest.approx(np.isclose(arranged, arranged.max()).mean())
 
 
 class Handmade(AlignedCurves):
@@ -211,27 +220,19 @@ def test_the_table_equals_a_slow_version():
     p = [[corrected(v, largest[k == 2]) for k, v in enumerate(frame)] for frame in everywhere]
     p, level = np.array(p), sorted(np.unique(p))[1]
     for k, name in enumerate(["knee", "hip", "offset"]):
-        values = np.column_stack([curves[..., 0], curves[..., 1], offsets])[:, 12 * k : 12 * k + 12]
-        frame = 0
-        while frame < 12:
-            first = frame
-            while frame < 12 and p[frame, k] <= level:
-                frame += 1
-            if frame > first:
-                stretch = slice(first, frame)
-                means = values[:, stretch].mean(axis=1)
+        values, what = (offsets, "timing") if k == 2 else (curves[..., k], "shape")
+        higher, lower = ("later than", "earlier than") if k == 2 else ("above", "below")
+        for differs, frames in groupby(range(12), key=lambda f, k=k: p[f, k] <= level):
+            if differs:
+                frames = list(frames)
+                means = values[:, frames].mean(axis=1)
                 a, b = means[LABELS == "a"], means[LABELS == "b"]
                 bounds = stats.ttest_ind(b, a, equal_var=False).confidence_interval()
-                peak = max(range(first, frame), key=lambda f: abs(everywhere[f, k]))
-                word = ["above", "above", "later than"] if b.mean() > a.mean() else [
-                    "below", "below", "earlier than"]  # fmt: skip
-                rows.append(
-                    ["timing" if k == 2 else "shape", name]
-                    + [100 / 11 * f for f in (first, frame - 1, peak)]
-                    + [p[stretch, k].min(), f"b {word[k]} a", b.mean() - a.mean(), *bounds]
-                    + [["deg", "", "%"][k]]
-                )
-            frame += 1
+                peak = max(frames, key=lambda f, k=k: abs(everywhere[f, k]))
+                places = [100 / 11 * f for f in (frames[0], frames[-1], peak)]
+                words = f"b {higher if b.mean() > a.mean() else lower} a"
+                sizes = [b.mean() - a.mean(), *bounds, ["deg", "", "%"][k]]
+                rows.append([what, name, *places, p[frames, k].min(), words, *sizes])
     aligned = Handmade.of_arrays(curves, offsets)
     found = compare_aligned(aligned, STUDY, 0, level, n_permutations=39)
     expected = pd.DataFrame(rows, columns=list(found.clusters))
@@ -241,6 +242,7 @@ def test_the_table_equals_a_slow_version():
     assert found.p_shape == ranks[0][0]
     assert found.p_timing == ranks[1][0]
     assert found.p_joint == np.mean(least <= least[0])
+    assert found.smallest_p == pytest.approx(2 / 252)
     of_linear = [np.abs(one).max() for one in of_linear]
     assert found.p_linear == np.mean(np.array(of_linear) >= (1 - 1e-6) * of_linear[0])
     assert found.to_frame()["p"].tolist() == [
@@ -370,6 +372,11 @@ def test_slopes_within_people_and_what_is_compared_in_words():
     assert between.words == "Regression, 4 people"
     np.testing.assert_allclose(between.units(ages), ages[::3])
     assert Study.of(ages, None, **given).words == "Regression, 12 trials"
+    given = {"y": [*"aabbcc"], "covariate": False, "paired": False, "n": 6}
+    assert Study.of(**given, groups=range(6)).words == "a, b and c, 6 people of one trial each"
+    assert Study.of(**given, groups=None).words == "a, b and c, 6 trials"
+    given |= {"y": [*"aabb"] * 4, "groups": np.arange(16) // 4}
+    assert Study.of(**given | {"paired": True, "n": 16}).words == "b less a, 4 people"
 
 
 def test_a_difference_in_timing_is_called_timing(late):
@@ -649,62 +656,3 @@ def test_refused_arguments(given, message, few):
     X, sync = few
     with pytest.raises(ValueError, match=message):
         compare_groups(sync, X, **given)
-
-
-def share_of_most_extreme(statistics):
-    return np.isclose(statistics, max(statistics)).mean()
-
-
-def by_all_arrangements(y, covariate=False):
-    """The share of arrangements that separate units as well as the best one."""
-    if not covariate:
-        groups = np.array(y)
-        arranged = [groups[list(order)] for order in permutations(range(len(groups)))]
-        return share_of_most_extreme(
-            [-sum(groups[labels == k].var() for k in set(groups)) for labels in arranged]
-        )
-    centred = np.array(y) - np.mean(y)
-    orders = permutations(range(len(centred)))
-    return share_of_most_extreme([abs(centred @ centred[list(order)]) for order in orders])
-
-
-@pytest.mark.parametrize(
-    "of",
-    [
-        {"y": [0, 0, 1, 1]},
-        {"y": [0, 0, 0, 1, 1]},
-        {"y": [0, 0, 1, 1, 2, 2]},
-        {"y": [1.0, 2, 3, 4], "covariate": True},
-        {"y": [1.0, 2, 3, 7], "covariate": True},
-        {"y": [1.0, 1, 2, 5], "covariate": True},
-    ],
-)
-def test_smallest_p_is_that_of_all_arrangements(of):
-    given = {"covariate": False} | of
-    study = Study.of(**given, groups=None, paired=False, n=len(of["y"]))
-    assert study.smallest_p == pytest.approx(by_all_arrangements(**of))
-
-
-def test_too_few_people_are_told_so():
-    """Of four pairs no p is below 0.125, however much they differ; of six it is 0.03."""
-    rng, t = np.random.default_rng(0), np.linspace(0, 1, 50)
-    for n, words in ((4, "too few to find a difference, as no p can be below 0.125"), (6, "they")):
-        curves = [np.sin(6 * t) + 100 * k + rng.normal(0, 0.1) for _ in range(n) for k in (0, 1)]
-        X = [curve[:, np.newaxis] for curve in curves]
-        sync = LinearSynchronizer(50).fit(X)
-        people = np.repeat(np.arange(n), 2)
-        given = {"groups": people, "paired": True, "n_permutations": 199}
-        found = compare_groups(sync, X, ["a", "b"] * n, **given)
-        assert f": {words}" in found.describe()
-        assert found.smallest_p == 2 / 2**n
-
-
-def test_people_of_one_trial_each_are_told():
-    gait = make_gait(8, 2, random_state=0)
-    sync = LinearSynchronizer(20).fit(gait.data)
-    given = {"y": gait.group, "n_permutations": 19}
-    of_trials = compare_groups(sync, gait.data, groups=range(len(gait.data)), **given)
-    assert "A and B, 16 people of one trial each: " in of_trials.describe()
-    assert "A and B, 16 trials: " in compare_groups(sync, gait.data, **given).describe()
-    of_people = compare_groups(sync, gait.data, groups=gait.person, **given)
-    assert "A and B, 8 people: " in of_people.describe()

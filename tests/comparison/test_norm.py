@@ -1,5 +1,7 @@
 """compare_to_norm: level, what is found, its numbers against slow versions, refusals."""
 
+from itertools import groupby
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -155,28 +157,18 @@ def test_departures_and_sentences_equal_a_slow_version(late, study):
     for i, (subject, curves) in enumerate(zip(found.verdicts.index, found.curves, strict=True)):
         of_subject, z = [], (curves - found.mean) / found.std
         for k, name in enumerate(found.features):
-            limit, frame = found.limits[i, k], 0
-            is_timing = k == len(found.features) - 1
+            limit, is_timing = found.limits[i, k], k == len(found.features) - 1
             words = ("later", "earlier") if is_timing else ("above", "below")
-            while frame < len(z):
-                first = frame
-                while frame < len(z) and abs(z[frame, k]) > limit / 2:
-                    frame += 1
-                frames = range(first, frame)
-                beyond = [f for f in frames if abs(z[f, k]) > limit]
+            size = np.abs(z[:, k])
+            for _, frames in groupby(range(len(z)), key=lambda f: size[f] > limit / 2):
+                frames = list(frames)
+                beyond = [f for f in frames if size[f] > limit]
                 if beyond:
-                    peak = max(frames, key=lambda f: abs(z[f, k]))
-                    of_subject.append(
-                        [subject, "timing" if is_timing else "shape", name]
-                        + [found.clock[f] for f in (beyond[0], beyond[-1], peak)]
-                        + [
-                            words[int(z[peak, k] < 0)],
-                            (curves - found.mean)[peak, k],
-                            found.units[k],
-                        ]
-                        + [z[peak, k]]
-                    )
-                frame += 1
+                    peak = frames[size[frames].argmax()]
+                    row = [subject, "timing" if is_timing else "shape", name]
+                    row += [found.clock[f] for f in (beyond[0], beyond[-1], peak)]
+                    row += [words[int(z[peak, k] < 0)], (curves - found.mean)[peak, k]]
+                    of_subject.append([*row, found.units[k], z[peak, k]])
         rows += sorted(of_subject, key=lambda row: abs(row[-1]), reverse=True)[:5]
         row = found.verdicts.iloc[i]
         assert row["p"] == min(1, 2 * min(row["p_shape"], row["p_timing"]))

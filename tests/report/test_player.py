@@ -116,6 +116,8 @@ def test_without_a_frame_rate_or_a_match(tmp_path):
     data = write(tmp_path).data["player"]
     assert (data["seconds"], data["warps"], data["frames"]) == (False, None, 0)
     assert data["pace"] * data["median"] == pytest.approx(4)
+    assert data["durations"] == [len(x) - 1 for x in BENDS.data]
+    assert data["median"] == np.median(data["durations"])
     tables = [pd.DataFrame(x) for x in BENDS.data]
     for k, x in enumerate(tables):
         x.attrs |= {"frame_rate": 20.0 + k, "trial": f"bend {k}"}
