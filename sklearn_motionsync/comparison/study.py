@@ -208,12 +208,9 @@ class Study:
         higher = "later" if what == "timing" else "above" if labels else "higher"
         lower = "earlier" if what == "timing" else "below" if labels else "lower"
         word = higher if size > 0 else lower
-        if not labels:
-            direction = f"{word} with the covariate"
-        else:
-            than = " than" if what == "timing" else ""
-            direction = f"{labels[1]} {word}{than} {labels[0]}"
-        return direction, size, size - half, size + half
+        than = " than" if what == "timing" else ""
+        words = f"{labels[1]} {word}{than} {labels[0]}" if labels else f"{word} with the covariate"
+        return words, size, size - half, size + half
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,8 +276,9 @@ class GroupsOfPeople:
         for maker in self.makers:
             weights = np.tensordot(maker, is_known.astype(float), 1)
             sums = np.tensordot(maker, np.nan_to_num(values), 1)
-            unknown = np.full(sums.shape, np.nan)
-            means.append(np.divide(sums, weights, out=unknown, where=weights > 0))
+            means.append(
+                np.divide(sums, weights, out=np.full(sums.shape, np.nan), where=weights > 0)
+            )
         return means
 
     def fill(self, values):
