@@ -287,29 +287,27 @@ def _chances(z, counts, of_norm, level):
     """
     p, limits = np.empty((len(z), 2)), np.empty((len(z), z.shape[2]))
     for j, columns in enumerate((slice(0, -1), slice(-1, None))):
-        of_new = {k: _largest_deviations(of_norm, k, columns) for k in set(counts)}
+        of_part = [x[:, :, columns] for x in of_norm]
+        of_new = {k: _largest_deviations(of_part, k) for k in set(counts)}
         for i, k in enumerate(counts):
             p[i, j] = of_new[k].tail(np.abs(z[i][:, columns]).max(), _PRIOR_VARIANCE)
             limits[i, columns] = of_new[k].upper_limit(1 - level / 2, _PRIOR_VARIANCE)
     return p, limits
 
 
-def _largest_deviations(of_people, k, part):
+def _largest_deviations(of_people, k):
     """The `LogMoments` of the largest deviation of a new person, of the mean of k trials.
 
     Parameters
     ----------
     of_people : list of ndarray, shape (n_trials_i, P, n_features)
     k : int
-    part : slice
-        Of the features.
     """
-    means = np.stack([x[:, :, part].mean(axis=0) for x in of_people])
+    means = np.stack([x.mean(axis=0) for x in of_people])
     logs, weights = [], []
     for i, x in enumerate(of_people):
         mean, std = _of_norm(np.delete(means, i, axis=0))
         # Means of k trials, of which each begins with another one.
-        x = x[:, :, part]
         curves = [np.roll(x, start, axis=0)[:k].mean(axis=0) for start in range(len(x))]
         z = np.abs((np.stack(curves) - mean) / std).max(axis=(1, 2))
         logs.append(np.log(np.maximum(z, np.finfo(float).tiny)))

@@ -276,9 +276,8 @@ class GroupsOfPeople:
         for maker in self.makers:
             weights = np.tensordot(maker, is_known.astype(float), 1)
             sums = np.tensordot(maker, np.nan_to_num(values), 1)
-            means.append(
-                np.divide(sums, weights, out=np.full(sums.shape, np.nan), where=weights > 0)
-            )
+            unknown = np.full(sums.shape, np.nan)
+            means.append(np.divide(sums, weights, out=unknown, where=weights > 0))
         return means
 
     def fill(self, values):
