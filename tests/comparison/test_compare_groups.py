@@ -146,15 +146,16 @@ def of_all_arrangements(values, y):
     [
         [0, 0, 1, 1], [0, 0, 0, 1, 1], [0, 0, 0, 1, 1, 1, 1], [0, 0, 1, 1, 2, 2],
         [0, 0, 1, 1, 2, 2, 2], [1.0, 2, 3, 4], [1.0, 2, 3, 7], [1.0, 1, 2, 5],
-        [1.0, 2, 2, 4, 5, 7, 9], None,
+        [1.0, 2, 2, 4, 5, 7, 9], "pairs", "within people",
     ],
 )  # fmt: skip
 def test_p_of_one_value_and_the_smallest_are_shares_of_all_arrangements(y):
     rng = np.random.default_rng(1)
-    if y is None:
-        values, given = 0.6 + rng.standard_normal(7), {"y": [0, 1] * 7, "paired": True}
-        given |= {"groups": np.repeat(range(7), 2), "covariate": False, "n": 14}
-        of_trials, extreme = np.column_stack([np.ones(7), 1 + values]).ravel(), np.ones(7)
+    if isinstance(y, str):
+        given = {"groups": np.repeat(range(7), 2), "y": [0, 1] * 7, "n": 14}
+        given |= {"paired": y == "pairs", "covariate": y != "pairs"}
+        y, values, extreme = None, 0.6 + rng.standard_normal(7), np.ones(7)
+        of_trials = np.column_stack([np.ones(7), 1 + values]).ravel()
     else:
         given = {"y": y, "covariate": y[0] == 1, "paired": False, "groups": None, "n": len(y)}
         y, extreme = np.array(y), np.array(y)
