@@ -299,7 +299,7 @@ def test_without_groups_there_is_no_test(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_a_covariate_takes_the_place_of_groups(tmp_path):
+def test_a_covariate_takes_the_place_of_groups(tmp_path, capsys):
     age = [int(p.removeprefix("person")) for p in GAIT.person]
     page = Text(
         write_report(
@@ -314,6 +314,8 @@ def test_a_covariate_takes_the_place_of_groups(tmp_path):
     )
     assert "Covariate" in page.headings
     assert "Regression, 8 people" in page.text
+    assert "No stretch of frames differs at p = 0.05." in page.text
+    assert capsys.readouterr().out == ""
     assert page.table("trials")["covariate"].tolist() == age
     assert page.rows("Offsets of trials")[0][:4] == ["trial", "person", "frames", "seconds"]
 
@@ -327,10 +329,11 @@ def test_rows_seconds_and_synchronizers_that_do_not_tell(tmp_path):
     assert "No trial is later or earlier than the pattern." in page.text
     assert page.table("trials")["seconds"].tolist() == [3.9] * 6
     assert page.table("timing")["offset (s)"].abs().max() == 0
-    one = Text(write_report(tmp_path / "b.html", sync, rows[:1]))
+    one = Text(write_report(tmp_path / "b.html", LINEAR, TRIALS[:1], features=0))
     assert "1 trial, on 20 frames." in one.text
     assert "Of the standard deviation" not in one.text
-    assert one.rows("Trials and their lengths")[1] == ["1", "40.0", ""]
+    seconds = (len(TRIALS[0]) - 1) / 100
+    assert one.rows("Trials and their lengths")[1] == ["1", f"{seconds:.2f}", ""]
     two = [rows[0, :, np.newaxis], rows[1, :30, np.newaxis]]
     sync = LinearSynchronizer(20).fit(two)
     two = Text(write_report(tmp_path / "b.html", sync, two, unit="frames"))
