@@ -144,7 +144,7 @@ def test_numbers_equal_a_slow_version(late):
     assert found.profile["linear"].xs("offset", level="feature").isna().all()
 
 
-@pytest.mark.parametrize("study", ["late", "weak", "noise"])
+@pytest.mark.parametrize("study", ["late", "weak", "healthy", "noise"])
 def test_departures_and_sentences_equal_a_slow_version(late, study):
     if study == "noise":  # many departures, and a norm of three people
         X = np.random.default_rng(0).standard_normal((6, 30, 9)).cumsum(axis=1)
@@ -152,7 +152,8 @@ def test_departures_and_sentences_equal_a_slow_version(late, study):
         sync = LinearSynchronizer(30).fit(X)
         found = compare_to_norm(sync, X, [*"nnnpqq"], norm="n", level=0.9, unit="frames")
     else:
-        found = compared(*(late if study == "late" else studied(amplitude=-25)), level=0.3)
+        amplitude = -25 if study == "weak" else 0
+        found = compared(*(late if study == "late" else studied(amplitude=amplitude)), level=0.3)
     rows = []
     for i, (subject, curves) in enumerate(zip(found.verdicts.index, found.curves, strict=True)):
         of_subject, z = [], (curves - found.mean) / found.std
@@ -184,13 +185,13 @@ def test_departures_and_sentences_equal_a_slow_version(late, study):
         assert found.describe(subject) == sentence
     expected = pd.DataFrame(rows, columns=list(found.departures))
     pd.testing.assert_frame_equal(found.departures, expected)
-    groups = {"late": ["B"] * 12, "weak": ["B"] * 12, "noise": ["p", "q", "q"]}[study]
+    groups = ["p", "q", "q"] if study == "noise" else ["B"] * 12
     assert found.verdicts["group"].tolist() == groups
     n = len(set(expected["subject"]))
-    assert n > 0
     words = f"{n} of {len(groups)} subjects {'differs' if n == 1 else 'differ'}"
     assert found.describe() == f"{words} from the norm of {found.n_people} people."
     assert study != "noise" or (expected.groupby("subject").size() == 5).any()
+    assert study != "healthy" or found.verdicts["p"].max() == 1
 
 
 def test_a_verdict_has_rows_just_if_it_differs(late):

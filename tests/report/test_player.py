@@ -166,6 +166,8 @@ def test_points_in_a_plane_and_as_many_trials_as_there_may_be(tmp_path):
 def test_points_without_bones_gaps_and_one_trial(tmp_path):
     x = BENDS.data[0].copy()
     x[5:9, :3] = np.nan
+    at_rest = write(tmp_path, PLANE, None).data["player"]
+    assert (at_rest["scale"], not np.any(positions_of(at_rest))) == (1, True)
     data = write(tmp_path, x, None).data["player"]
     assert (data["bones"], len(data["dots"]), data["counts"]) == ([], 15, [len(x)])
     (points,) = positions_of(data)
