@@ -222,6 +222,7 @@ SPACE = pd.DataFrame(np.ones((9, 6)), columns=[f"j{k}_{axis}" for k in range(2) 
 @pytest.mark.parametrize(
     ("given", "error", "message"),
     [
+        ({"X": [PLANE, SPACE], "skeleton": None}, ValueError, r"Trial 1 has \(2, 3\) points and"),
         ({"keyframes": [3] * 5}, ValueError, "keyframes|key-frames"),
         ({"keyframes": [[3]] * 4 + [[len(BENDS.data[4])]]}, ValueError, "[Tt]rial 4"),
         ({"keyframes": [[3]] * 4 + [[-1]]}, ValueError, "[Tt]rial 4"),
@@ -230,9 +231,8 @@ SPACE = pd.DataFrame(np.ones((9, 6)), columns=[f"j{k}_{axis}" for k in range(2) 
         ({"names": ["a"]}, ValueError, "names must be a list of text, one for each of the 5"),
         ({"match": Match([[0, 1, 2]])}, ValueError, "match must be of the 5 trials of X"),
         ({"match": DenseSynchronizer()}, ValueError, "not fitted"),
-        ({"X": [PLANE, SPACE], "skeleton": None}, ValueError, r"Trial 1 has \(2, 3\) points and"),
         ({"keyframes": [[3]]}, ValueError, r"list of 5 arrays .*, one a trial"),
-        ({"keyframes": [[3]] * 4 + [[len(BENDS.data[4])]]}, ValueError, "Trial 4: key-frames must"),
+        ({"keyframes": [[3]] * 4 + [[99]]}, ValueError, "Trial 4: key-frames must .* included"),
         ({"skeleton": "acclaim"}, ValueError, "skeleton must be a Skeleton"),
         ({"frame_rate": 0}, ValueError, "frame_rate"),
         ({"X": []}, ValueError, "0 trials"),
