@@ -161,7 +161,7 @@ def write_report(
         if y is not None or covariate or paired:
             n = len(aligned.curves)
             study = Study.of(y, groups, covariate=covariate, paired=paired, n=n)
-            comparison = compare_aligned(aligned, study, random_state)
+            comparison = compare_aligned(aligned, study, random_state=random_state)
         trials = TrialSet.of(aligned, labels, groups, y if covariate else None)
         page = Page()
         _add_set(page, trials, left_out)
