@@ -85,6 +85,17 @@ class Text(HTMLParser):
         rows = re.findall("<tr>(.*?)</tr>", after.partition("</table>")[0])
         return [re.findall("<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows]
 
+    def check(self, caption, expected):
+        """Of fractions three digits of the largest one are shown."""
+        heads, *rows = self.rows(caption)
+        assert heads == list(expected)
+        for texts, (_, column) in zip(zip(*rows, strict=True), expected.items(), strict=True):
+            if column.dtype.kind in "if":
+                limit = 0.006 * column.abs().max() * (column.dtype.kind == "f")
+                np.testing.assert_allclose(np.array(texts, float), column, atol=limit)
+            else:
+                assert list(texts) == column.astype(str).tolist()
+
 
 def capture_figures(patch):
     """The list that will hold the figures of reports."""
@@ -105,12 +116,6 @@ def evenly(X, n):
         [[np.interp(np.linspace(0, len(x) - 1, n), range(len(x)), column) for column in x.T]
          for x in X]
     ).transpose(0, 2, 1)  # fmt: skip
-
-
-def assert_numbers(texts, values):
-    """Three digits of the largest number are shown."""
-    np.testing.assert_allclose([float(text) for text in texts], values, atol=0.006 * max(
-        map(abs, values)))  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -171,32 +176,22 @@ def test_tables_hold_the_numbers_of_the_match(groups):
     at = np.abs(offsets).argmax(axis=1)
     numbers = np.abs(offsets).mean(axis=1), offsets[range(16), at], 2.0 * at
     np.testing.assert_allclose(trials[list(columns)].T, numbers, rtol=1e-5)
-    heads, *rows = groups.rows("Offsets of trials")
-    assert heads == [*known, *columns]
-    assert [row[:4] for row in rows] == trials[known[:4]].astype(str).to_numpy().tolist()
-    for texts, values in zip(list(zip(*rows, strict=True))[5:], numbers, strict=True):
-        assert_numbers(texts, values)
+    groups.check("Offsets of trials", trials.drop(columns=["pattern", "doubtful"]))
     worst = np.abs(numbers[1]).argmax()
-    words = f"{page.number(abs(numbers[1][worst]))} % " + (
-        "later" if numbers[1][worst] > 0 else "earlier"
-    )
-    assert (
-        f"The largest offset is that of trial walk {worst}: {words} than the pattern, at "
-        f"{page.number(2 * at[worst])} %."
-    ) in groups.text
-    heads, *rows = groups.rows("Offsets of groups")
-    assert heads == ["group", *columns, "of trial"]
-    of = [np.flatnonzero(GAIT.group == label) for label in "AB"]
-    first = [k[np.abs(numbers[1][k]).argmax()] for k in of]
-    assert [[row[0], row[-1]] for row in rows] == [
-        [label, f"walk {k}"] for label, k in zip("AB", first, strict=True)
-    ]
-    means = [numbers[0][k].mean() for k in of]
-    for texts, values in zip(
-        list(zip(*rows, strict=True))[1:4], (means, numbers[1][first], numbers[2][first]),
-        strict=True,
-    ):  # fmt: skip
-        assert_numbers(texts, values)
+    word = "later" if numbers[1][worst] > 0 else "earlier"
+    offset, place = (page.number(abs(values[worst])) for values in numbers[1:])
+    words = f"is that of trial walk {worst}: {offset} % {word} than the pattern, at {place} %."
+    assert f"The largest offset {words}" in groups.text
+    rows = []
+    for label in "AB":
+        of_group = np.flatnonzero(GAIT.group == label)
+        first = of_group[np.abs(numbers[1][of_group]).argmax()]
+        rows.append(
+            [label, numbers[0][of_group].mean(), *(values[first] for values in numbers[1:])]
+        )
+        rows[-1].append(f"walk {first}")
+    expected = pd.DataFrame(rows, columns=["group", *columns, "of trial"])
+    groups.check("Offsets of groups", expected)
 
 
 def test_spreads_are_those_of_trials_before_and_after(groups):
@@ -207,23 +202,19 @@ def test_spreads_are_those_of_trials_before_and_after(groups):
         f"Of the standard deviation between time-normalised trials, {left.min():.0f} to "
         f"{left.max():.0f} % is left after alignment."
     ) in groups.text
-    heads, *rows = groups.rows("Standard deviation between trials")
-    assert heads == ["signal", "time-normalised", "aligned", "left (%)"]
-    names, *columns = zip(*rows, strict=True)
-    assert names[0] == "hip_flexion (deg)"
-    # Signals have units of their own: three digits of each.
-    for texts, values in zip(columns[:2], spreads, strict=True):
-        assert list(texts) == [page.number(value) for value in values]
-    assert_numbers(columns[2], left)
+    names = ["hip_flexion (deg)", "knee_flexion (deg)", "ankle_dorsiflexion (deg)"]
+    table = {"signal": [*names, "vertical_force (body weights)"], "time-normalised": spreads[0]}
+    table = pd.DataFrame(table | {"aligned": spreads[1], "left (%)": left})
+    groups.check("Standard deviation between trials", table)
 
 
 def test_figures_show_the_curves_and_offsets(groups):
     before_and_after, timing, _ = groups.figures
     match = Match.from_estimator(SYNC, TRIALS)
-    warped, even, offsets = (
-        match.warp(GAIT.data),
-        evenly(GAIT.data, 51),
+    offsets, even, warped = (
         match.offsets_in("percent"),
+        evenly(GAIT.data, 51),
+        match.warp(GAIT.data),
     )
     panels = before_and_after.axes
     assert len(panels) == 8
@@ -260,14 +251,21 @@ def test_the_test_is_that_of_compare_groups(groups):
         groups.table("clusters"), found.clusters, rtol=1e-4, check_dtype=False
     )
     np.testing.assert_allclose(groups.table("p_values")["p"], found.to_frame()["p"], rtol=1e-4)
-    heads, *rows = groups.rows("Where they differ")
-    assert heads[:6] == ["differs in", "signal", "from (%)", "to (%)", "direction", "size"]
-    assert heads[6:] == ["95\u00a0% from", "95\u00a0% to", "unit", "p"]
-    columns = list(zip(*rows, strict=True))
-    for k, name in {0: "what", 1: "feature", 4: "direction", 8: "unit"}.items():
-        assert list(columns[k]) == found.clusters[name].tolist()
-    for k, name in {2: "start", 3: "end", 5: "size", 6: "lower", 7: "upper", 9: "p"}.items():
-        assert_numbers(columns[k], found.clusters[name])
+    columns = [
+        "what",
+        "feature",
+        "start",
+        "end",
+        "direction",
+        "size",
+        "lower",
+        "upper",
+        "unit",
+        "p",
+    ]
+    heads = ["differs in", "signal", "from (%)", "to (%)", "direction", "size", "95\u00a0% from"]
+    heads += ["95\u00a0% to", "unit", "p"]
+    groups.check("Where they differ", found.clusters[columns].set_axis(heads, axis=1))
     assert [[test, differs] for test, _, differs in groups.rows(
         "Probability of such differences by chance")[1:]] == [
         ["joint", "yes"], ["shape", "no"], ["timing", "yes"], ["linear", "yes"]]  # fmt: skip
