@@ -177,14 +177,12 @@ class Expectation:
         self._windows, scaled = windows, windows[:, :, np.newaxis] * self.scale
         weighted = np.einsum("pq,wqf->wpf", self.over_time, scaled, optimize=True)
         norms = np.einsum("wpf,wpf->wf", scaled, weighted)
-        self._alone = 1 / np.maximum(norms, _SMALLEST * max(norms.max(initial=0), _SMALLEST))
+        self._alone = 1 / norms
         self._inverse = []
         for _, columns, blocks in self._alike:
             windows_of_parts, other = scaled[:, :, columns], weighted[:, :, columns]
-            products = np.einsum("wpki,wpkj->wkij", windows_of_parts, other, optimize=True) * blocks
-            trace = np.trace(products, axis1=2, axis2=3)[..., np.newaxis, np.newaxis]
-            eye = np.eye(columns.shape[1])
-            self._inverse.append(np.linalg.inv(products + 1e-9 * (trace + _SMALLEST) * eye))
+            products = np.einsum("wpki,wpkj->wkij", windows_of_parts, other, optimize=True)
+            self._inverse.append(np.linalg.inv(products * blocks))
 
     def weigh(self, deviations):
         """Deviations (K, n_columns) in standard units, by the inverse covariances."""
@@ -405,10 +403,10 @@ class FaultFinder:
             still.append(evidence.still)
             lags.append(evidence.lags), ratios.append(evidence.ratios)
         if self._linear is not None and not pairs:
-            # Others are kept in linear time: the larger ones of both.
-            of_late = np.sort([gains.max() for gains in late.values()])
-            ranks = np.linspace(0, len(of_late) - 1, len(scores))
-            scores = np.maximum(np.sort(scores), np.interp(ranks, range(len(of_late)), of_late))
+            # Others are kept in linear time: the larger ones of both, rank by rank.
+            order, ranks = np.argsort(scores), np.linspace(0, 1, len(scores))
+            of_late = np.quantile([gains.max() for gains in late.values()], ranks)
+            scores = np.maximum(scores, of_late[np.argsort(order)])
         gains = np.maximum([scores, alone, still], _SMALLEST)
         self._usual = np.exp(np.log(gains).mean(axis=1))
         self._usual[2] = self._usual[0]
@@ -418,7 +416,7 @@ class FaultFinder:
         # A new trial is one of a new group.
         of_groups = [logs[codes == group] for group in np.unique(codes)]
         means = np.array([x.mean() for x in of_groups])
-        within = np.mean([x.var(ddof=1) * (1 - 1 / len(x)) if len(x) > 1 else 0 for x in of_groups])
+        within = np.mean([x.var() for x in of_groups])
         squares = np.square(means - means.mean()).sum() + (len(means) + 2) * within
         limit = t_prediction_limit(len(means), squares, coverage, _PRIOR_VARIANCE)
         self.usual_score = float(_HINT * np.exp(means.mean()))
@@ -429,8 +427,6 @@ class FaultFinder:
     def _coarse(self, trials):
         """Trials at the frames on which faults are sought."""
         n_frames = trials.shape[1]
-        if n_frames == self._n_frames:
-            return trials.astype(np.float64)
         times = np.linspace(0, n_frames - 1, self._n_frames)
         return np.array([at_times(x, times) for x in trials])
 
@@ -512,7 +508,7 @@ class _Learnt:
         for part in self._parts:
             mean = variance[:, part.columns].mean()
             raised[:, part.columns] += _VARIANCE_FLOOR * mean
-        return np.maximum(raised, _SMALLEST * max(raised.max(), _SMALLEST))
+        return raised
 
 
 def precisions(scores):
@@ -569,7 +565,7 @@ def windows_of(n_frames):
     rising, falling = ((t - spans[:, :1]) / ramp + 0.5, (spans[:, 1:] - t) / ramp + 0.5)
     windows = _smooth_step(rising) * _smooth_step(falling)
     windows[0] = 1
-    return windows, np.clip(spans, 0, 1)
+    return windows, np.clip(np.round(spans, 9), 0, 1)
 
 
 def shifted(curves, lag):
