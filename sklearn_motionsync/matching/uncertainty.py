@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from .sizes import BATCH_NUMBERS, EQUAL
+from .sizes import BATCH, EQUAL
 from .tile import Bases, Tile, right_factor
 from .trellis import Trellis
 from .warps import even_slices
@@ -94,7 +94,7 @@ def _coarse(matcher, n_frames, count):
         count,
         trellis.mu,
         max_offset=trellis.reach / n_frames,
-        max_rate=max(1, table.steps.max() / table.subframes),
+        max_rate=table.steps.max() / table.subframes,
         unseen=trellis.unseen,
         anchors=trellis.anchors and trellis.anchors.at(count),
     )
@@ -128,7 +128,7 @@ def _spread_of_paths(trellis, base, moving, times):
     energies = np.maximum(energies, np.finfo(np.float64).tiny)
     spread, shares = np.empty(times.shape), np.empty(len(times))
     offsets = np.arange(-width, width + 1)[:, np.newaxis]
-    for rows in even_slices(len(times), max(1, BATCH_NUMBERS // (n_frames * len(offsets)))):
+    for rows in even_slices(len(times), BATCH):
         totals = _rows(trellis, base, moving[rows])
         shares[rows] = np.maximum(totals[-1, width], 0) / energies[rows]
         totals += _rows(trellis, base[:, ::-1], moving[rows, ::-1])[::-1, ::-1]

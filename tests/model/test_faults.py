@@ -7,6 +7,7 @@ from sklearn_motionsync.model.faults import (
     FaultFinder,
     Part,
     expected_trial,
+    windows_of,
 )
 from sklearn_motionsync.model.variation import predictive_variance, within_variance
 
@@ -68,6 +69,12 @@ def windows_by_hand(n):
             spans.append((max(start, 0) / 100, min(start + length, 100) / 100))
             start += min(5, length / 2)
     return np.array(rows), np.array(spans)
+
+
+@pytest.mark.parametrize("n_frames", [4, 20, 21, 60])
+def test_windows_are_those_by_hand(n_frames):
+    for found, expected in zip(windows_of(n_frames), windows_by_hand(n_frames), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def inverses_by_hand(scores):
@@ -216,7 +223,7 @@ class ByHand:
             group: inverses_by_hand(scores[whose != group] if len(set(whose)) > 1 else scores)
             for group in whose
         }
-        new = expected(slice(None), reference if many or reference is None else reference)
+        new = expected(slice(None), reference)
         return (new, inverses_by_hand(scores)), [
             (group, trials[i], of_one, by_others[group]) for i, group, of_one in rows
         ]
@@ -309,13 +316,13 @@ def resampled(X, n_frames):
 @pytest.mark.parametrize(
     ("n_frames", "groups", "n_reference", "in_linear_time"),
     [
-        (22, [0, 0, 1, 1, 2], None, None),
         (12, [1, 1, 0, 0, 2, 2], 3, "pairs"),
         (20, [0, 0, 0, 0], None, None),
         (9, [0, 0, 0, 1], 1, None),
         (10, [0, 1, 2, 3], 2, "others"),
-        (67, [0, 0, 1, 1], 2, "pairs"),
         (4, [0, 1, 2, 2], None, "others"),
+        (22, [0, 0, 1, 1, 2], None, None),
+        (67, [0, 0, 1, 1], 2, "pairs"),
     ],
 )
 def test_faults_equal_those_by_hand(n_frames, groups, n_reference, in_linear_time):
