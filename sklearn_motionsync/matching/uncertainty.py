@@ -132,7 +132,6 @@ def _spread_of_paths(trellis, base, moving, times):
         totals = _rows(trellis, base, moving[rows])
         shares[rows] = np.maximum(totals[-1, width], 0) / energies[rows]
         totals += _rows(trellis, base[:, ::-1], moving[rows, ::-1])[::-1, ::-1]
-        totals -= totals.min(axis=1, keepdims=True)
         totals /= -np.maximum(_TEMPERATURE * shares[rows], EQUAL[totals.dtype]) * energies[rows]
         weights = np.exp(totals, out=totals)
         sums = weights.sum(axis=1)

@@ -1,0 +1,456 @@
+"""Walks, their events and their parameters, computed slowly by hand."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import find_peaks
+from scipy.stats import norm
+from sklearn_motionsync import Skeleton
+from sklearn_motionsync.datasets import make_walk
+from sklearn_motionsync.gait import gait_parameters
+from sklearn_motionsync.gait.events import events_of
+from sklearn_motionsync.gait.recordings import Walk, joints_of_feet
+
+MADE = make_walk(2, n_strides=5, noise=0.003, random_state=3)
+ON_BELT = make_walk(1, n_strides=5, treadmill=True, random_state=3)
+JOINTS = list(MADE.skeleton.joints)
+
+
+# -- walks ---------------------------------------------------------------------------------------
+
+NAMES = ["pelvis", "left_hip", "right_hip", "left_heel", "right_heel", "left_toe", "right_toe"]
+
+
+def moving_points(t, toes=0.2):
+    """Points of NAMES, cubic polynomials of time; hips are apart along x, toes ahead along z."""
+    pelvis, left, right = (
+        np.polynomial.polynomial.polyval(t / 4, np.random.default_rng(k).standard_normal((4, 3))).T
+        for k in range(3)
+    )
+    pelvis[:, 1] += 20
+    points = [pelvis, pelvis + [0.1, 0, 0], pelvis - [0.2, 0, 0], left, right]
+    return np.stack([*points, left + [0, 0, toes], right + [0, 0, toes]], axis=1)
+
+
+def walk_of(points, names=NAMES, *, frame_rate=60, landmarks=None, feet=None):
+    """A walk by names of joints, the first three of which are landmarks."""
+    landmarks = {(landmarks or {}).get(name, name): name for name in names[:3]}
+    body = Skeleton(names, [-1] * len(names), landmarks, n_dims=points.shape[2])
+    feet = joints_of_feet(body, feet)
+    return Walk(points.reshape(len(points), -1), body, feet, frame_rate, "Walk")
+
+
+@pytest.mark.parametrize("toes", [0.2, -0.2])
+@pytest.mark.parametrize(("rate", "per_frame"), [(30, 8), (100, 3), (240, 1), (500, 1)])
+def test_samples_between_frames_lie_on_cubic_polynomials(rate, per_frame, toes):
+    n_frames = rate
+    walk = walk_of(moving_points(np.arange(n_frames) / rate, toes), frame_rate=rate)
+    assert (walk.per_frame, walk.rate) == (per_frame, rate * per_frame)
+    assert walk.n_samples == (n_frames - 1) * per_frame + 1
+    expected = moving_points(np.arange(walk.n_samples) / walk.rate, toes)
+    leg = np.median(expected[:, 0, 1] - expected[:, 3:5, 1].min(axis=1))
+    assert walk.leg == pytest.approx(leg, rel=1e-9)
+    assert walk.has_heel == {"left": True, "right": True}
+    expected /= leg
+    high = expected[1:, 3:5, 1] - expected[1:, :1, 1]
+    speed = np.diff(expected[:, 3:5, 2] - expected[:, :1, 2], axis=0)
+    sense = np.sign(((high - high.mean(axis=0)) * speed).sum())
+    np.testing.assert_allclose(walk.forward, np.tile([0, sense], (walk.n_samples, 1)), atol=1e-12)
+    ends = [3, 4, 5, 6] if sense * toes > 0 else [5, 6, 3, 4]
+    np.testing.assert_allclose(walk.pelvis, expected[:, 0], atol=1e-9)
+    for k, end in zip(ends, [*walk.heels.values(), *walk.toes.values()], strict=True):
+        np.testing.assert_allclose(end, expected[:, k], atol=1e-9)
+    ahead = sense * (expected[:, 3] - expected[:, 0])[:, 2]
+    np.testing.assert_allclose(walk.ahead(expected[:, 3]), ahead, atol=1e-9)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_filtered_waves_have_the_response_of_a_gaussian(order):
+    rate, width, frequency = 500, 0.02, 9.0
+    t = np.arange(1000) / rate
+    walk = walk_of(moving_points(t), frame_rate=rate)
+    gain = np.exp(-((frequency * width) ** 2) / 2) * frequency**order
+    waves = np.sin(np.outer(t, [frequency, 1]) + np.array([0, order * np.pi / 2]))
+    found = walk.filtered(waves, width, order)[100:-100, 0]
+    expected = gain * np.sin(frequency * t + order * np.pi / 2)[100:-100]
+    np.testing.assert_allclose(found, expected, atol=0.02 * gain)
+    waves[[4, 7, 11]] = np.nan
+    found = walk.filtered(waves[:15, 0], width, order)
+    assert np.flatnonzero(np.isnan(found)).tolist() == [4, 5, 6, 7, 11]
+
+
+def test_gaps_of_a_fifth_of_a_second_are_filled_and_short_pieces_left_out():
+    points = moving_points(np.arange(120) / 60)
+    for first, last in [(20, 32), (47, 60), (75, 88), (102, 115)]:
+        points[first:last, [3, 5]] = np.nan
+    seen = ~np.isnan(walk_of(points).heels["left"]).any(axis=1)
+    assert seen.nonzero()[0].tolist() == [*range(4 * 46 + 1), *range(4 * 60, 4 * 74 + 1)]
+    for rate, n_frames in ((60, 15), (10, 4)):
+        walk_of(points[:n_frames], frame_rate=rate)
+        with pytest.raises(ValueError, match=f"Walk has {n_frames - 1} frames"):
+            walk_of(points[: n_frames - 1], frame_rate=rate)
+
+
+def test_noise_of_heels_is_that_of_their_heights():
+    points, rng = moving_points(np.arange(600) / 60), np.random.default_rng(0)
+    points[:, 3:5, 1] = [0.01, 0.03] * rng.standard_normal((600, 2))
+    points[100:110, 3] = np.nan
+    walk = walk_of(points)
+    for side, heights in zip(("left", "right"), points[:, 3:5, 1].T, strict=True):
+        third = np.abs(heights[3:] - 3 * heights[2:-1] + 3 * heights[1:-2] - heights[:-3])
+        expected = np.nanpercentile(third, 25) / norm.ppf(0.625) / np.sqrt(1 + 9 + 9 + 1)
+        assert walk.noise[side] * walk.leg == pytest.approx(expected, rel=1e-3)
+    points[::3, 3] = np.nan
+    assert walk_of(points).noise["left"] == 0
+
+
+def test_hidden_markers_keep_their_way_from_the_others():
+    t = np.arange(100) / 60
+    points = moving_points(t)
+    beside = points[:, 3] + np.outer(np.clip(t, 0.25, 1.2), [0.1, 0.2, 0.3]) + 0.1
+    never = np.full_like(beside, np.nan)
+    points = np.concatenate([points, np.stack([beside, never], axis=1)], axis=1)
+    names, feet = [*NAMES, "beside", "never"], {"left_heel": ("left_heel", "beside", "never")}
+    whole = walk_of(points, names, feet=feet)
+    np.testing.assert_allclose(
+        whole.heels["left"][::4] * whole.leg, (points[:, 3] + beside) / 2, atol=1e-9
+    )
+    for k, first, last in ((7, 30, 60), (3, 30, 60), (7, 0, 10), (7, 80, 100)):
+        hidden = points.copy()
+        hidden[first:last, k] = np.nan
+        walk = walk_of(hidden, names, feet=feet)
+        np.testing.assert_allclose(walk.heels["left"], whole.heels["left"], atol=1e-9)
+
+
+def test_directions():
+    """Across hips or shoulders, else along the feet, else where they come apart."""
+    points = moving_points(np.arange(400) / 100)
+    turns = 0.8 * np.sin(np.arange(400) / 60)
+    across = np.column_stack([np.cos(turns), 0 * turns, np.sin(turns)])
+    points[:, 1], points[:, 2] = points[:, 0] + across, points[:, 0] - across
+    finer = np.interp(np.arange(1198) / 3, np.arange(400), turns)
+    expected = gaussian_filter1d(np.column_stack([-np.sin(finer), np.cos(finer)]), 60, axis=0)
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    shoulders = [name.replace("hip", "shoulder") for name in NAMES]
+    for names in (NAMES, shoulders):
+        found = walk_of(points, names, frame_rate=100).forward[300:-300]
+        found = found * np.sign(found[0] @ expected[300])
+        np.testing.assert_allclose(found, expected[300:-300], atol=1e-3)
+    points[:, 5:] = points[:, 3:5] + [[0.3, 0.2, 0.4], [0.6, -0.1, 0.8]]
+    knee = {"right_hip": "left_knee"}
+    along = walk_of(points, landmarks=knee, frame_rate=100).forward
+    np.testing.assert_allclose(np.abs(along), np.tile([0.6, 0.8], (len(along), 1)), atol=1e-9)
+    points[:, 3:5] = points[:, :1] + np.sin(np.arange(800)).reshape(400, 2, 1) * [0.8, 1.0, -0.6]
+    points[:, 3:5, 1] -= 3
+    no_toes = {"left_toe": None, "right_toe": None}
+    apart = walk_of(points, landmarks=knee, frame_rate=100, feet=no_toes).forward
+    apart = apart * np.sign(apart[:, :1])
+    np.testing.assert_allclose(apart, np.tile([0.8, -0.6], (len(apart), 1)), atol=1e-9)
+
+
+def test_bodies_that_stand_have_a_direction_if_they_have_hips():
+    points = np.repeat(moving_points(np.zeros(1)), 30, axis=0)
+    walk = walk_of(points)
+    np.testing.assert_allclose(walk.forward, np.tile([0.0, 1.0], (117, 1)), atol=1e-12)
+    points[:, 1:3] = points[:, :1]
+    assert (walk_of(points).forward == 0).all()
+    points[:, 0] = np.nan
+    with pytest.raises(ValueError, match="Walk: the pelvis is never seen above the feet"):
+        walk_of(points)
+
+
+# -- events --------------------------------------------------------------------------------------
+
+
+def vertex(y, k):
+    """Where a parabola through three samples is largest."""
+    if not 0 < k < len(y) - 1:
+        return float(k)
+    a, b, _ = np.polyfit([-1, 0, 1], y[k - 1 : k + 2], 2)
+    return k - b / (2 * a)
+
+
+def highest(y, by):
+    """The local maximum of y where `by` is largest; None without one."""
+    peaks = [k for k in range(1, len(y) - 1) if y[k - 1] <= y[k] > y[k + 1]]
+    return vertex(y, max(peaks, key=lambda k: by[k])) if peaks else None
+
+
+def turning_points(walk, side, points, sign):
+    """Samples where a foot is farthest ahead or behind, and whether at an end."""
+    curve = sign * walk.filtered(walk.ahead(points), 0.03)
+    known = np.flatnonzero(~np.isnan(curve))
+    if not len(known):
+        return []
+    span = np.percentile(curve[known], 97) - np.percentile(curve[known], 3)
+    (other,) = [heel for s, heel in walk.heels.items() if s != side] or [walk.pelvis]
+    way = (points - other)[:, [0, 2]] if points.shape[1] == 3 else (points - other)[:, :1]
+    rows, reach = [], int(0.6 * walk.rate + 1e-9)
+    for run in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+        y = curve[run]
+        outside = y.min() - span
+        peaks, _ = find_peaks(
+            [outside, *y, outside], prominence=max(0.4 * span, 0.15),
+            distance=int(0.35 * walk.rate + 1e-9),
+        )  # fmt: skip
+        for k in peaks - 1:
+            at_start, at_stop = k <= int(0.03 * walk.rate + 1e-9), k >= len(y) - 3
+            around = way[max(run[0] + k - reach, 0) : run[0] + k + reach]
+            moved = np.linalg.norm(around.max(axis=0) - around.min(axis=0))
+            if (at_start or not at_stop) and not moved < 0.15:
+                rows.append((run[0] + (k if at_start else vertex(y, k)), at_start))
+    return rows
+
+
+def delayed(walk, side, curve, moments, usual, spread, first, last, doubt=0.0):
+    """Peaks of a curve after moments, None where there is none; and whether their mean has one."""
+    rate = walk.rate
+    variance = walk.noise[side] ** 2 * walk.per_frame / rate
+    inner = [round(k) for k, is_end in moments if not is_end]
+    lags, n = range(int(np.round(first * rate)), int(np.round(last * rate)) + 1), max(len(inner), 1)
+    rows = [[curve[k + d] if 0 <= k + d < len(curve) else np.nan for d in lags] for k in inner]
+    mean = np.nanmean(rows, axis=0) if rows else np.full(len(lags), np.nan)
+    height = np.sqrt(variance / n * 0.2116 / 0.0175**5)
+    seconds = np.array(lags) / rate
+    at = highest(mean, mean - height / 2 * ((seconds - usual) / spread) ** 2)
+
+    def weight(width, count, more):
+        noise = variance / count * 0.5289 / 0.0175**7 / 14000**2
+        return width**2 / (width**2 + noise + more**2)
+
+    delay = usual * rate
+    if at is not None:
+        delay += weight(spread, n, doubt) * (at + lags[0] - delay)
+    half = np.inf if at is None else mean[round(at)] / 2
+
+    def peak_between(a, b):
+        a, b = max(0, round(a) - 1), min(len(curve), round(b) + 2)
+        piece = curve[a:b]
+        found = highest(piece, piece) if len(piece) > 2 else None
+        return None if found is None else a + found
+
+    found = []
+    for k, is_end in moments:
+        if is_end:
+            peak = peak_between(k, k + last * rate) if weight(0.01, 1, 0.0) > 0.5 else None
+            found.append(peak if peak is not None and curve[round(peak)] > half else None)
+            continue
+        middle = k + delay
+        peak = peak_between(middle - 0.04 * rate, middle + 0.04 * rate)
+        found.append(middle if peak is None else middle + weight(0.01, 1, doubt) * (peak - middle))
+    return found, at is not None
+
+
+def events_by_hand(walk):
+    strikes, behind, events = {}, {}, []
+    for side, heel in walk.heels.items():
+        doubt, ahead = 0.0 if walk.has_heel[side] else 0.02, turning_points(walk, side, heel, 1)
+        strike = 0.04, 0.015, -0.02, 0.15, doubt
+        at, is_known = delayed(walk, side, walk.filtered(heel[:, 1], 0.0175, 2), ahead, *strike)
+        if not is_known:
+            at, _ = delayed(walk, side, -walk.filtered(heel[:, 1], 0.0175), ahead, *strike)
+        strikes[side] = [k for k in at if k is not None]
+        foot = walk.toes.get(side, heel)
+        behind[side] = [(k, end) for k, end in turning_points(walk, side, foot, -1) if not end]
+    late = []
+    for side, moments in behind.items():
+        others = [k for other, at in strikes.items() if other != side for k in at]
+        if side in walk.toes and others:
+            late += [k - min(others, key=lambda other: abs(other - k)) for k, _ in moments]
+    late = [k / walk.rate for k in late if abs(k) / walk.rate < 0.35]
+    for side, moments in behind.items():
+        heel, off = walk.heels[side], [k for k, _ in moments]
+        if side not in walk.toes:
+            rise = walk.filtered(heel[:, 1], 0.0175, 1)
+            off, _ = delayed(walk, side, rise, moments, 0.0, 0.05, -0.15, 0.1)
+            off = [k + 0.02 * walk.rate for k in off]
+        elif late and np.median(late) < 0.04:
+            rise = walk.filtered(walk.toes[side][:, 1], 0.0175, 2)
+            off, _ = delayed(walk, side, rise, moments, -0.09, 0.015, -0.16, 0.06)
+        rows = [("Foot Strike", side, k) for k in strikes[side]] + [
+            ("Foot Off", side, k) for k in off
+        ]
+        for row in rows:
+            k = round(row[2])
+            if 0 <= k < len(heel) and np.isfinite(heel[k]).all():
+                events.append(row)
+    return sorted(events, key=lambda event: event[2])
+
+
+def changed(kind):
+    """A made walk that was changed, with its skeleton, feet and frame rate."""
+    made = ON_BELT if kind == "belt" else MADE
+    points = made.data[kind == "noisy"].reshape(-1, len(JOINTS), 3).copy()
+    skeleton, feet, rate = MADE.skeleton, {}, 100
+    if kind.startswith("cut"):
+        points = points[int(kind[3:]) :]
+    elif kind == "noisy":
+        points += np.random.default_rng(0).normal(0, 0.02, points.shape)
+    elif kind == "slow":
+        points, rate = points[::4], 25
+    elif kind == "without heels":
+        feet = {"left_heel": None, "right_heel": None}
+    elif kind == "without toes":
+        feet = {"left_toe": None, "right_toe": None}
+    elif kind == "running":
+        toes = [JOINTS.index(f"{side}_toe") for side in ("left", "right")]
+        ways = points[:, toes] - points[:, :1]
+        points[:-9, toes] = points[:-9, :1] + ways[9:]
+    elif kind == "one foot":
+        foot = [JOINTS.index(f"left_{part}") for part in ("ankle", "heel", "toe")]
+        points[:, foot] = np.nan
+    elif kind == "gaps":
+        points[150:230, JOINTS.index("left_heel")] = np.nan
+        points[330:400, JOINTS.index("right_toe")] = np.nan
+    elif kind == "short steps":
+        pelvis = points[:, :1]
+        points[200:450, :, 2] = (pelvis + 0.35 * (points - pelvis))[200:450, :, 2]
+    elif kind == "side view":
+        points = points[..., [2, 1]]
+        skeleton = Skeleton(JOINTS, skeleton.parents, dict(skeleton.landmarks), n_dims=2)
+    elif kind == "flat":
+        feet = {"left_toe": None, "right_toe": None}
+        points[..., 1] = np.round(points[..., 1], 1)
+    elif kind in ("slow belt", "sliding"):
+        pace = {"slow belt": 0.3, "sliding": 0.2}[kind]
+        points += np.multiply.outer(np.arange(len(points)) / rate, [0, 0, pace])[:, np.newaxis]
+    return points.reshape(len(points), -1), skeleton, feet, rate
+
+
+KINDS = [
+    "whole", "cut12", "cut30", "cut44", "cut70", "cut97", "noisy", "slow", "without heels",
+    "without toes", "running", "one foot", "gaps", "short steps", "side view", "flat",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_events_equal_those_by_hand(kind):
+    x, skeleton, feet, rate = changed(kind)
+    walk = Walk(x, skeleton, joints_of_feet(skeleton, feet), rate, "Walk")
+    found, expected = events_of(walk), events_by_hand(walk)
+    assert len(found) > 5
+    assert [event[:2] for event in found] == [event[:2] for event in expected]
+    np.testing.assert_allclose([k for *_, k in found], [k for *_, k in expected], atol=1e-6)
+
+
+# -- parameters ----------------------------------------------------------------------------------
+
+
+def parameters_by_hand(walk, events, leg):
+    """Rows of left, right, mean, standard deviation, number and asymmetry of each parameter."""
+
+    def at(label, side):
+        return [k for name, of, k in events if (name, of) == (label, side)]
+
+    def ground(points, k):
+        row = points[min(max(round(k), 0), len(points) - 1)]
+        return row[[0, 2] if len(row) == 3 else [0]]
+
+    speeds = []
+    for side, heel in walk.heels.items():
+        for first in at("Foot Strike", side):
+            last = next((k for k in at("Foot Off", side) if k > first), None)
+            if last is not None:
+                a, b = round(first + 0.25 * (last - first)), round(first + 0.55 * (last - first))
+                if a < b < len(heel):
+                    speeds.append((ground(heel, b) - ground(heel, a)) / (b - a) * walk.rate)
+    speeds = [v for v in speeds if np.isfinite(v).all()]
+    belt = np.median(speeds, axis=0) if speeds else np.zeros(walk.forward.shape[1])
+    if np.hypot.reduce(belt) <= 0.25:
+        belt = 0 * belt
+    out = {}
+    for side, other in (("left", "right"), ("right", "left")):
+        strikes, rows = at("Foot Strike", side), []
+        every = [*np.diff(strikes), *np.diff(at("Foot Strike", other))]
+        for first, last in pairwise(strikes):
+            if last - first > 1.5 * np.median(every):
+                continue
+
+            def only(label, of, first=first, last=last):
+                inside = [k for k in at(label, of) if first < k < last]
+                return inside[0] if len(inside) == 1 else np.nan
+
+            off, opposite, other_off = (
+                only(*which)
+                for which in (("Foot Off", side), ("Foot Strike", other), ("Foot Off", other))
+            )
+            stride, heel = last - first, walk.heels[side]
+            way = ground(heel, last) - ground(heel, first) - belt * stride / walk.rate
+            length, row = np.hypot.reduce(way), {}
+            row["stride time"], row["stride length"] = stride / walk.rate, length * leg
+            row["speed"] = row["stride length"] / row["stride time"]
+            row["stance time"], row["swing time"] = (
+                (off - first) / walk.rate,
+                (last - off) / walk.rate,
+            )
+            row["stance"] = 100 * (off - first) / stride
+            row["step time"] = (last - opposite) / walk.rate
+            row["cadence"] = 60 / row["step time"]
+            if opposite == opposite:
+                step = ground(heel, last) - ground(walk.heels[other], opposite)
+                step = step - belt * (last - opposite) / walk.rate
+                unit = way / length if length else way
+                row["step length"] = leg * step @ unit
+                if len(step) == 2:
+                    row["step width"] = leg * abs(step[0] * unit[1] - step[1] * unit[0])
+            if np.isfinite([off, opposite, other_off]).all():
+                moments = np.sort([first, off, opposite, other_off, last])
+                middles = (moments[1:] + moments[:-1]) / 2
+                this, that = middles < off, (middles < other_off) & (middles > opposite)
+                if other_off < opposite:
+                    that = (middles < other_off) | (middles > opposite)
+                shares = 100 * np.diff(moments) / stride
+                row["double support"] = shares[this & that].sum()
+                row["single support"] = shares[this & ~that].sum()
+                row["flight"] = shares[~this & ~that].sum()
+            rows.append(row)
+        out[side] = rows
+    table = {}
+    for name in PARAMETERS:
+        left, right = (
+            np.array([row[name] for row in out[side] if np.isfinite(row.get(name, np.nan))])
+            for side in ("left", "right")
+        )
+        both = np.r_[left, right]
+        means = [x.mean() if len(x) else np.nan for x in (left, right)]
+        mean, spread = (
+            both.mean() if len(both) else np.nan,
+            both.std(ddof=1) if len(both) > 1 else np.nan,
+        )
+        middle = np.mean(means)
+        asymmetry = 100 * (means[0] - means[1]) / middle if middle else np.nan
+        table[name] = [*means, mean, spread, len(both), asymmetry]
+    return table
+
+
+PARAMETERS = {
+    "cadence": "steps/min", "speed": "m/s", "stride time": "s", "step time": "s",
+    "stance time": "s", "swing time": "s", "stance": "%", "single support": "%",
+    "double support": "%", "flight": "%", "stride length": "m", "step length": "m",
+    "step width": "m",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "kind", ["whole", "belt", "slow belt", "sliding", "running", "one foot", "gaps", "side view"]
+)
+def test_parameters_equal_those_by_hand(kind):
+    """Of centimetres; a strike and a foot-off are missing, and one foot-off is there twice."""
+    x, skeleton, feet, rate = changed(kind)
+    walk = Walk(x, skeleton, joints_of_feet(skeleton, feet), rate, "Walk")
+    events = events_of(walk)
+    events = [*events[:6], *events[7:11], *events[12:], ("Foot Off", "right", events[9][2] + 3)]
+    events.sort(key=lambda event: event[2])
+    names = ["label", "context", "frame"]
+    table = pd.DataFrame([(a, b, k / walk.per_frame) for a, b, k in events], columns=names)
+    data = pd.DataFrame(100 * x, columns=skeleton.column_names)
+    data.attrs |= {"frame_rate": rate, "units": "cm"}
+    found = gait_parameters(data, skeleton, events=table, feet=feet).loc[0]
+    assert found["unit"].to_dict() == PARAMETERS
+    expected = parameters_by_hand(walk, events, walk.leg)
+    values = found.drop(columns="unit").astype(float)
+    np.testing.assert_allclose(values, [expected[name] for name in values.index], atol=1e-7)
+    assert (values["n"] > 1).sum() >= 4
