@@ -1,6 +1,7 @@
 """Walks, their events and their parameters, computed slowly by hand."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,11 +13,70 @@ from sklearn_motionsync import Skeleton
 from sklearn_motionsync.datasets import make_walk
 from sklearn_motionsync.gait import gait_parameters
 from sklearn_motionsync.gait.events import events_of
-from sklearn_motionsync.gait.recordings import Walk, joints_of_feet
+from sklearn_motionsync.gait.recordings import Recordings, Walk, joints_of_feet
 
 MADE = make_walk(2, n_strides=5, noise=0.003, random_state=3)
 ON_BELT = make_walk(1, n_strides=5, treadmill=True, random_state=3)
 JOINTS = list(MADE.skeleton.joints)
+
+
+# -- recordings ----------------------------------------------------------------------------------
+
+
+def tables(units=("mm", "in"), levels=("subject", "trial", "frame")):
+    """Every second frame from 4 on, of 100 a second; and frames 0 to 9."""
+    out = []
+    for label, unit, index in zip(
+        [("a", 1), ("b", 2)], units, [range(4, 24, 2), range(10)], strict=True
+    ):
+        table = pd.DataFrame(np.zeros((10, 57)), list(index), MADE.skeleton.column_names)
+        table.attrs |= {"frame_rate": 100.0, "units": unit, "trial": label, "levels": levels}
+        out.append(table)
+    return out
+
+
+def test_rows_frames_times_and_units_of_recordings():
+    recordings = Recordings(tables())
+    assert recordings.levels == ["subject", "trial"]
+    np.testing.assert_allclose(recordings.frames_at(0, [0, 0.5, 9]), [4, 5, 22])
+    np.testing.assert_allclose(recordings.times_at(0, [0, 0.5, 9]), [0.04, 0.05, 0.22])
+    for row, frame in ((0.5, 5), (9, 22), (-0.7, 3.3), (9.4, 22.4)):
+        assert recordings.row_of_frame(0, frame) == pytest.approx(row)
+    assert recordings.row_of_time(0, 0.05) == pytest.approx(0.5)
+    leg = SimpleNamespace(leg=2.0)
+    assert [recordings.length_of_leg(i, leg) for i in range(2)] == [(0.002, "m"), (2.0, "")]
+    leg = [Recordings(tables(("cm", "m"))).length_of_leg(i, leg) for i in range(2)]
+    assert leg == [(0.02, "m"), (2.0, "m")]
+    for rates in ([1.0, 10_000.0], 50):
+        assert len(Recordings(tables(), frame_rate=rates)) == 2
+    for rate in (0.99, 10_001):
+        with pytest.raises(ValueError, match=f"Trial .* has a frame rate of {rate:g}"):
+            Recordings(tables(), frame_rate=[100, rate])
+
+
+def test_events_of_a_table_go_to_their_recordings():
+    columns = ["subject", "trial", "label", "context", "frame"]
+    events = pd.DataFrame([
+        ("b", 2, "Foot Off", "left", 9.5), ("b", 2, "Foot Off", " Right ", -0.5),
+        ("a", 1, "Foot Strike", "LEFT", 5), ("a", 1, "Event", "Left", 5),
+        ("a", 1, "Foot Off", "General", 5), ("b", 2, "Foot Off", "Left", np.nan),
+    ], columns=columns)  # fmt: skip
+    recordings = Recordings(tables())
+    assert recordings.split_events(None) == [None, None]
+    assert recordings.split_events(events) == [
+        [("Foot Strike", "left", 0.5)],
+        [("Foot Off", "right", -0.5), ("Foot Off", "left", 9.5)],
+    ]
+    seconds = events.assign(time=events["frame"] / 100).drop(columns="frame")
+    (((_, _, row),), _) = recordings.split_events(seconds)
+    assert row == pytest.approx(0.5)
+    for frame in (-0.51, 9.51):
+        with pytest.raises(ValueError, match=rf"Foot Off left at frame {frame} is outside of"):
+            recordings.split_events(events.head(1).assign(frame=frame))
+    with pytest.raises(ValueError, match="there is no column 'trial'"):
+        recordings.split_events(events.drop(columns="trial"))
+    one = Recordings(tables()[1:])
+    assert one.split_events(events[:2].drop(columns="trial"))[0][1] == ("Foot Off", "left", 9.5)
 
 
 # -- walks ---------------------------------------------------------------------------------------

@@ -336,6 +336,9 @@ def test_faults_equal_those_by_hand(n_frames, groups, n_reference, in_linear_tim
     X = mean + variation * (X - mean)
     groups, reference, linear = np.array(groups), None, None
     parts = [*PARTS, Part("small", [3], [3], None), Part("still", [4], [4], None)]
+    if n_frames > 60:
+        # All parts of one column.
+        del parts[0]
     if n_reference:
         reference = X[:n_reference] + 0.1
     if in_linear_time:
