@@ -175,13 +175,13 @@ class Expectation:
 
     def _prepare_windows(self, windows):
         self._windows, scaled = windows, windows[:, :, np.newaxis] * self.scale
-        weighted = np.einsum("pq,wqf->wpf", self.over_time, scaled, optimize=True)
+        weighted = self.over_time @ scaled
         norms = np.einsum("wpf,wpf->wf", scaled, weighted)
         self._alone = 1 / norms
         self._inverse = []
         for _, columns, blocks in self._alike:
             windows_of_parts, other = scaled[:, :, columns], weighted[:, :, columns]
-            products = np.einsum("wpki,wpkj->wkij", windows_of_parts, other, optimize=True)
+            products = np.einsum("wpki,wpkj->wkij", windows_of_parts, other)
             self._inverse.append(np.linalg.inv(products * blocks))
 
     def weigh(self, deviations):
@@ -209,7 +209,7 @@ class Expectation:
         """The largest gain of a lag of each part, at least 0, and the lag: (n_parts,)."""
         if not len(self.lags):
             return np.zeros(len(self.parts)), np.zeros(len(self.parts))
-        sums = np.einsum("lpf,pf->lf", self._shifts, weighed, optimize=True) @ self._belongs
+        sums = np.einsum("lpf,pf->lf", self._shifts, weighed) @ self._belongs
         gains = 2 * sums - self._shift_norms
         best = first_largest(gains, axis=0)
         largest = gains[best, np.arange(len(self.parts))]
@@ -233,7 +233,7 @@ class Expectation:
         weighted = self.over_time @ x
         for of, columns, blocks in self._alike:
             x_of_parts, other = x[:, columns], weighted[:, columns]
-            out[of] = np.einsum("pki,pkj,kij->k", x_of_parts, other, blocks, optimize=True)
+            out[of] = (np.einsum("pki,pkj->kij", x_of_parts, other) * blocks).sum(axis=(1, 2))
         return out
 
 
@@ -541,7 +541,7 @@ def precisions(scores):
     correlation = (1 - share) * correlation + share * stationary
     correlation = (1 - _WHITE) * correlation + _WHITE * np.eye(n_frames)
     inverse = np.linalg.inv(correlation)
-    products = np.einsum("npf,pq,nqg->fg", scores, inverse, scores, optimize=True)
+    products = np.tensordot(scores, inverse @ scores, axes=[[0, 1], [0, 1]])
     norms = np.sqrt(np.maximum(np.diag(products), _SMALLEST * np.diag(products).max()))
     between = (1 - _INDEPENDENT) * products / np.outer(norms, norms)
     np.fill_diagonal(between, 1.0)

@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 from scipy.stats import norm
 from sklearn_motionsync import Skeleton
 from sklearn_motionsync.datasets import make_walk
-from sklearn_motionsync.gait import gait_parameters
+from sklearn_motionsync.gait import gait_events, gait_parameters
 from sklearn_motionsync.gait.events import events_of
 from sklearn_motionsync.gait.recordings import Recordings, Walk, joints_of_feet
 
@@ -355,10 +355,26 @@ def changed(kind):
         feet = {"left_heel": None, "right_heel": None}
     elif kind == "without toes":
         feet = {"left_toe": None, "right_toe": None}
-    elif kind == "running":
-        toes = [JOINTS.index(f"{side}_toe") for side in ("left", "right")]
+    elif kind.startswith(("toes", "dips")):
+        # Toes are ahead of their time, as those of runners; and dip so long after they are behind.
+        early, toes = 9, [JOINTS.index(f"{side}_toe") for side in ("left", "right")]
+        if kind.startswith("toes"):
+            early = int(kind[4:])
         ways = points[:, toes] - points[:, :1]
-        points[:-9, toes] = points[:-9, :1] + ways[9:]
+        points[:-early, toes] = points[:-early, :1] + ways[early:]
+        walk = Walk(points.reshape(len(points), -1), skeleton, joints_of_feet(skeleton), rate, "")
+        for (side, foot), toe in zip(walk.toes.items(), toes, strict=True):
+            if kind.startswith("dips"):
+                behind = [k / 3 + float(kind[4:]) for k, _ in turning_points(walk, side, foot, -1)]
+                off = np.subtract.outer(np.arange(len(points)), behind)
+                points[:, toe, 1] = -0.05 * np.exp(-((off / 3) ** 2) / 2).sum(axis=1)
+    elif kind.startswith(("heels", "ankles")):
+        # Heights of heels are late.
+        feet = {"left_toe": None, "right_toe": None} if kind.startswith("ankles") else {}
+        frames = np.arange(len(points))
+        for side in ("left", "right"):
+            heights = points[:, JOINTS.index(f"{side}_heel"), 1]
+            heights[:] = np.interp(frames - float(kind.split()[1]), frames, heights)
     elif kind == "one foot":
         foot = [JOINTS.index(f"left_{part}") for part in ("ankle", "heel", "toe")]
         points[:, foot] = np.nan
@@ -382,7 +398,9 @@ def changed(kind):
 
 KINDS = [
     "whole", "cut12", "cut30", "cut44", "cut70", "cut97", "noisy", "slow", "without heels",
-    "without toes", "running", "one foot", "gaps", "short steps", "side view", "flat",
+    "without toes", "one foot", "gaps", "short steps", "side view", "flat", "toes 5", "toes 9",
+    "toes 56", "dips -15.9", "dips -15.6", "dips 5.75", "dips 6.1", "heels -13.5", "heels -6",
+    "heels 12.5", "ankles 7.5", "ankles 12.5",
 ]  # fmt: skip
 
 
@@ -495,7 +513,8 @@ PARAMETERS = {
 
 
 @pytest.mark.parametrize(
-    "kind", ["whole", "belt", "slow belt", "sliding", "running", "one foot", "gaps", "side view"]
+    "kind",
+    ["whole", "belt", "slow belt", "sliding", "toes 9", "one foot", "gaps", "side view"],
 )
 def test_parameters_equal_those_by_hand(kind):
     """Of centimetres; a strike and a foot-off are missing, and one foot-off is there twice."""
@@ -514,3 +533,11 @@ def test_parameters_equal_those_by_hand(kind):
     values = found.drop(columns="unit").astype(float)
     np.testing.assert_allclose(values, [expected[name] for name in values.index], atol=1e-7)
     assert (values["n"] > 1).sum() >= 4
+
+
+def test_feet_that_stand_have_no_length():
+    events = gait_events(MADE.data[:1], MADE.skeleton, frame_rate=100)
+    still = np.repeat(MADE.data[0][:1], len(MADE.data[0]), axis=0)
+    table = gait_parameters([still], MADE.skeleton, events=events, frame_rate=100).loc[0]
+    rows = table.loc[["speed", "stride length", "step length"], ["left", "right", "mean"]]
+    assert (rows == 0).all(axis=None)
