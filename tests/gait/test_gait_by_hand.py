@@ -381,9 +381,10 @@ def changed(kind):
     elif kind == "gaps":
         points[150:230, JOINTS.index("left_heel")] = np.nan
         points[330:400, JOINTS.index("right_toe")] = np.nan
-    elif kind == "short steps":
-        pelvis = points[:, :1]
-        points[200:450, :, 2] = (pelvis + 0.35 * (points - pelvis))[200:450, :, 2]
+    elif kind.startswith("short steps"):
+        # Some hardly reach the least share of the usual swing.
+        pelvis, share = points[:, :1], float(kind.split()[2])
+        points[200:450, :, 2] = (pelvis + share * (points - pelvis))[200:450, :, 2]
     elif kind == "side view":
         points = points[..., [2, 1]]
         skeleton = Skeleton(JOINTS, skeleton.parents, dict(skeleton.landmarks), n_dims=2)
@@ -398,7 +399,7 @@ def changed(kind):
 
 KINDS = [
     "whole", "cut12", "cut30", "cut44", "cut70", "cut97", "noisy", "slow", "without heels",
-    "without toes", "one foot", "gaps", "short steps", "side view", "flat", "toes 5", "toes 9",
+    "without toes", "one foot", "gaps", "short steps 0.371", "short steps 0.392", "side view", "flat", "toes 5", "toes 9",
     "toes 56", "dips -15.9", "dips -15.6", "dips 5.75", "dips 6.1", "heels -13.5", "heels -6",
     "heels 12.5", "ankles 7.5", "ankles 12.5",
 ]  # fmt: skip
