@@ -301,7 +301,7 @@ class _DelayedPeak:
 
     def _peak_between(self, first, last):
         first, last = max(0, round(first) - 1), min(len(self._curve), round(last) + 2)
-        at = _peak(self._curve[first:last]) if last - first > 2 else None
+        at = _peak(self._curve[first:last])
         return None if at is None else first + at
 
 
@@ -316,7 +316,7 @@ def _farthest(walk, side, points, sign):
         return []
     low, high = np.percentile(seen, [3, 97])
     least = max(_LEAST_SWING * (high - low), LEAST_STEP)
-    distance, out = max(1, whole(_LEAST_STRIDE * walk.rate, "down")), []
+    distance, out = whole(_LEAST_STRIDE * walk.rate, "down"), []
     other_heels = [heel for other, heel in walk.heels.items() if other != side]
     apart = horizontal(points - (other_heels[0] if other_heels else walk.pelvis))
     reach = whole(_SWING * walk.rate, "down")
@@ -361,9 +361,7 @@ def _peak(values, curve=None):
 
 
 def _between(values, k):
-    """Where values have their maximum at sample k, by a parabola."""
-    if not 0 < k < len(values) - 1:
-        return float(k)
+    """Where values have their maximum at sample k, no end, by a parabola."""
     return float(k + parabola_vertex(*values[k - 1 : k + 2])[0])
 
 

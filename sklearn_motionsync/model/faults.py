@@ -334,8 +334,7 @@ class FaultFinder:
         expected = self._expected
         evidence = self._evidence(expected, rest)
         of_late = None if later is None else self._evidence(self._late, later)
-        total = self._total(evidence, None if of_late is None else of_late.lag_gains)
-        total = np.where(is_open, total, -1)
+        total = is_open * self._total(evidence, None if of_late is None else of_late.lag_gains)
         part = first_largest(total)
         if not total[part] > 0:
             return None, None

@@ -15,7 +15,7 @@ from sklearn_motionsync.gait import gait_events, gait_parameters
 from sklearn_motionsync.gait.events import events_of
 from sklearn_motionsync.gait.recordings import Recordings, Walk, joints_of_feet
 
-MADE = make_walk(2, n_strides=5, noise=0.003, random_state=3)
+MADE = make_walk(2, n_strides=5, noise=0.0009, random_state=3)
 ON_BELT = make_walk(1, n_strides=5, treadmill=True, random_state=3)
 JOINTS = list(MADE.skeleton.joints)
 
@@ -347,10 +347,29 @@ def changed(kind):
     skeleton, feet, rate = MADE.skeleton, {}, 100
     if kind.startswith("cut"):
         points = points[int(kind[3:]) :]
+    elif kind == "short":
+        points = points[120:260]
     elif kind == "noisy":
         points += np.random.default_rng(0).normal(0, 0.02, points.shape)
     elif kind == "slow":
         points, rate = points[::4], 25
+    elif kind.startswith("quick"):
+        points, rate = points[: int(kind[5:])], 250
+    elif kind == "shuffling":
+        # Ever longer steps.
+        share = np.linspace(0.1, 0.4, len(points))[:, np.newaxis]
+        points[..., 2] = points[:, :1, 2] + share * (points[..., 2] - points[:, :1, 2])
+    elif kind == "rocking":
+        # The pelvis swings above feet that stand, and then above feet that move a little.
+        ends, foot = (
+            [JOINTS.index(f"{side}_{end}") for side in sides for end in ("heel", "toe")]
+            for sides in (("left", "right"), ("left",))
+        )
+        points[250:] = points[250]
+        wave = np.sin(np.arange(len(points) - 250) / 9)[:, np.newaxis]
+        points[250:, :, 2] += 0.3 * wave
+        points[250:, ends, 2] = points[250, ends, 2]
+        points[250:, foot, 2] -= np.linspace(0, 0.2, len(wave))[:, np.newaxis] * wave
     elif kind == "without heels":
         feet = {"left_heel": None, "right_heel": None}
     elif kind == "without toes":
@@ -368,6 +387,7 @@ def changed(kind):
                 behind = [k / 3 + float(kind[4:]) for k, _ in turning_points(walk, side, foot, -1)]
                 off = np.subtract.outer(np.arange(len(points)), behind)
                 points[:, toe, 1] = -0.05 * np.exp(-((off / 3) ** 2) / 2).sum(axis=1)
+                points[:200, toe] = np.nan
     elif kind.startswith(("heels", "ankles")):
         # Heights of heels are late.
         feet = {"left_toe": None, "right_toe": None} if kind.startswith("ankles") else {}
@@ -398,10 +418,11 @@ def changed(kind):
 
 
 KINDS = [
-    "whole", "cut12", "cut30", "cut44", "cut70", "cut97", "noisy", "slow", "without heels",
-    "without toes", "one foot", "gaps", "short steps 0.371", "short steps 0.392", "side view", "flat", "toes 5", "toes 9",
-    "toes 56", "dips -15.9", "dips -15.6", "dips 5.75", "dips 6.1", "heels -13.5", "heels -6",
-    "heels 12.5", "ankles 7.5", "ankles 12.5",
+    "whole", "cut12", "cut30", "cut73", "cut88", "cut97", "short", "noisy", "slow", "quick435",
+    "quick400", "without heels", "without toes", "one foot", "gaps", "shuffling", "rocking",
+    "short steps 0.371", "short steps 0.392", "side view", "flat", "toes 5", "toes 9", "toes 56",
+    "dips -15.9", "dips -15.67", "dips 5.67", "dips 6", "heels -7.5", "heels -6", "heels -5.5",
+    "heels 10.5", "ankles 7.5", "ankles 8", "ankles 15.5",
 ]  # fmt: skip
 
 
