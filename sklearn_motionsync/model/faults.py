@@ -387,21 +387,21 @@ class FaultFinder:
 
     def _calibrate(self, coverage):
         """The scores that are usual and rare, and how lags and amplitudes of people vary."""
-        late, pairs = {}, False
-        if self._linear is not None:
-            pairs = len(self._linear.indices) == len(self._clock.indices)
-            for i, expectation, deviations in self._linear.left_out(self._windows[:0]):
+        late, linear = {}, self._linear
+        pairs = linear is not None and len(linear.indices) == len(self._clock.indices)
+        if linear is not None:
+            for i, expectation, deviations in linear.left_out(self._windows[:0]):
                 late[i] = expectation.of_lags(expectation.weigh(deviations))[0]
         scores, alone, still, lags, ratios = [], [], [], [], []
         for i, expectation, deviations in self._clock.left_out(self._windows):
             evidence = self._evidence(expectation, deviations)
             # Without pairs, lags in linear time are compared below.
-            late_gains = None if self._linear is None else late[i] if pairs else 0.0
+            late_gains = None if linear is None else late[i] if pairs else 0.0
             scores.append(self._total(evidence, late_gains).max())
             alone.append(evidence.alone.max())
             still.append(evidence.still)
             lags.append(evidence.lags), ratios.append(evidence.ratios)
-        if self._linear is not None and not pairs:
+        if linear is not None and not pairs:
             # Others are kept in linear time: the larger ones of both, rank by rank.
             order, ranks = np.argsort(scores), np.linspace(0, 1, len(scores))
             of_late = np.quantile([gains.max() for gains in late.values()], ranks)
@@ -526,8 +526,9 @@ def precisions(scores):
     between : ndarray, shape (n_columns, n_columns)
     """
     n_frames, width = scores.shape[1:]
-    rows = scores.transpose(0, 2, 1).reshape(-1, n_frames)
-    covariance = rows.T @ rows / len(rows)
+    courses = np.concatenate(scores, axis=1)
+    n_courses = courses.shape[1]
+    covariance = courses @ courses.T / n_courses
     size = np.trace(covariance) / n_frames
     if not size > 0:
         return np.eye(n_frames), np.eye(width)
@@ -536,7 +537,7 @@ def precisions(scores):
     by_lag = np.array([np.trace(correlation, k) for k in range(n_frames)]) / n_frames
     frames = np.arange(n_frames)
     stationary = by_lag[np.abs(frames[:, np.newaxis] - frames)]
-    share = _STATIONARY_ROWS / (_STATIONARY_ROWS + len(rows))
+    share = _STATIONARY_ROWS / (_STATIONARY_ROWS + n_courses)
     correlation = (1 - share) * correlation + share * stationary
     correlation = (1 - _WHITE) * correlation + _WHITE * np.eye(n_frames)
     inverse = np.linalg.inv(correlation)

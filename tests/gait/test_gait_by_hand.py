@@ -347,6 +347,9 @@ def changed(kind):
     skeleton, feet, rate = MADE.skeleton, {}, 100
     if kind.startswith("cut"):
         points = points[int(kind[3:]) :]
+    elif kind == "nearly clear":
+        points = points[73:]
+        points += np.random.default_rng(0).normal(0, 0.001, points.shape)
     elif kind == "short":
         points = points[120:260]
     elif kind == "noisy":
@@ -422,7 +425,7 @@ KINDS = [
     "quick400", "without heels", "without toes", "one foot", "gaps", "shuffling", "rocking",
     "short steps 0.371", "short steps 0.392", "side view", "flat", "toes 5", "toes 9", "toes 56",
     "dips -15.9", "dips -15.67", "dips 5.67", "dips 6", "heels -7.5", "heels -6", "heels -5.5",
-    "heels 10.5", "ankles 7.5", "ankles 8", "ankles 15.5",
+    "heels 10.5", "nearly clear", "ankles 7.5", "ankles 8", "ankles 15.5",
 ]  # fmt: skip
 
 
