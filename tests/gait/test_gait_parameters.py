@@ -30,19 +30,6 @@ def test_known_lengths_and_times(treadmill):
         assert own["cadence"] == pytest.approx(60 / steps.mean(), rel=0.01)
 
 
-def test_shares_of_a_stride_add_up():
-    walk = make_walk(3, random_state=1)
-    table = gait_parameters(walk.data, walk.skeleton, frame_rate=walk.frame_rate)
-    for i in range(3):
-        own = table.loc[i][["left", "right"]]
-        total = own.loc["single support"] + own.loc["double support"]
-        np.testing.assert_allclose(total, own.loc["stance"], rtol=1e-9)
-        np.testing.assert_allclose(
-            own.loc["stance time"] + own.loc["swing time"], own.loc["stride time"], rtol=1e-9
-        )
-        assert (own.loc["flight"] == 0).all()
-
-
 def test_asymmetry():
     """The left foot strikes 5 % of the stride late: its step takes 55 %, the right one 45 %."""
     walk = make_walk(4, n_strides=10, asymmetry=5, random_state=0)
