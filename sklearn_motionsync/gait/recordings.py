@@ -168,8 +168,7 @@ class Recordings:
 
     def _find_rates(self, frame_rate):
         if frame_rate is not None:
-            rates = as_frame_rates(frame_rate, len(self))
-            rates = np.broadcast_to(rates, (len(self), 1))[:, 0].tolist()
+            rates = np.resize(as_frame_rates(frame_rate, len(self)), len(self)).tolist()
         else:
             rates = [frame_rate_of_rows(x) for x in self._given]
         if None in rates:

@@ -146,5 +146,5 @@ def _rows(trellis, base, moving):
     states = tile.states(base.shape[1])
     for _ in tile.advance(states):
         pass
-    rows = states.reshape(len(states), -1, len(moving))
+    rows = states.reshape(len(states), 2 * trellis.centre + 1, len(moving))
     return rows[:, trellis.pad : rows.shape[1] - trellis.pad]
