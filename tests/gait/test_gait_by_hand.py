@@ -184,13 +184,12 @@ def changed(kind):
                 points[:, toe, 1] = -0.05 * np.exp(-((off / 3) ** 2) / 2).sum(axis=1)
                 points[:200, toe] = np.nan
     elif kind.startswith(("heels", "ankles")):
-        # Heights of heels are late, and the recording begins later.
+        # Heights of heels are late.
         feet = {"left_toe": None, "right_toe": None} if kind.startswith("ankles") else {}
         frames = np.arange(len(points))
         for side in ("left", "right"):
             heights = points[:, JOINTS.index(f"{side}_heel"), 1]
             heights[:] = np.interp(frames - float(kind.split()[1]), frames, heights)
-        points = points[int([*kind.split(), 0][2]) :]
     elif kind == "one foot":
         foot = [JOINTS.index(f"left_{part}") for part in ("ankle", "heel", "toe")]
         points[:, foot] = np.nan
@@ -218,7 +217,7 @@ KINDS = [
     "quick400", "without heels", "without toes", "one foot", "gaps", "shuffling", "rocking",
     "short steps 0.371", "short steps 0.392", "side view", "flat", "toes 5", "toes 9", "toes 56",
     "dips -15.9", "dips -15.67", "dips 5.67", "dips 6", "heels -7.5", "heels -6", "heels -5.5",
-    "heels 10.5", "heels -1 11", "nearly clear", "ankles 7.5", "ankles 8", "ankles 15.5",
+    "heels 10.5", "nearly clear", "ankles 7.5", "ankles 8", "ankles 15.5",
 ]  # fmt: skip
 
 
