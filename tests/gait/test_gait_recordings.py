@@ -208,6 +208,7 @@ def test_directions():
 
 def test_bodies_that_stand_have_a_direction_if_they_have_hips():
     points = np.repeat(moving_points(np.zeros(1)), 30, axis=0)
+    points[:9, 1] = points[20:, 2] = np.nan
     walk = walk_of(points)
     np.testing.assert_allclose(walk.forward, np.tile([0.0, 1.0], (117, 1)), atol=1e-12)
     assert walk_of(points[..., :2]).forward.tolist() == [[1.0]] * 117
