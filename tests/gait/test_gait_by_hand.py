@@ -331,7 +331,7 @@ PARAMETERS = {
 
 @pytest.mark.parametrize(
     "kind",
-    ["whole", "belt", "slow belt", "sliding", "toes 9", "one foot", "gaps", "side view"],
+    ["whole", "belt", "slow belt", "sliding", "toes 9", "toes 18", "one foot", "gaps", "side view"],
 )
 def test_parameters_equal_those_by_hand(kind):
     """Of centimetres; a strike and a foot-off are missing, and one foot-off is there twice."""

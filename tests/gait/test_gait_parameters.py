@@ -40,21 +40,6 @@ def test_asymmetry():
     np.testing.assert_allclose(even, 0, atol=2)
 
 
-def test_running_flies():
-    """Events of a runner: each foot stands for 0.25 s of a stride of 0.7 s."""
-    walk = make_walk(1, n_strides=3, random_state=0)
-    rows = []
-    for k in range(4):
-        for context, start in (("Left", 0.7 * k), ("Right", 0.7 * k + 0.35)):
-            rows.append(("Foot Strike", context, start))
-            rows.append(("Foot Off", context, start + 0.25))
-    events = pd.DataFrame(rows, columns=["label", "context", "time"])
-    table = gait_parameters(walk.data, walk.skeleton, events=events, frame_rate=100).loc[0]
-    assert table.loc["flight", "mean"] == pytest.approx(100 * 0.2 / 0.7)
-    assert table.loc["double support", "mean"] == pytest.approx(0, abs=1e-9)
-    assert table.loc["stance", "mean"] == pytest.approx(100 * 0.25 / 0.7)
-
-
 def test_given_events_count():
     walk = make_walk(2, random_state=0)
     events = gait_events(walk.data, walk.skeleton, frame_rate=100)
