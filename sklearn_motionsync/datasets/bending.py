@@ -12,14 +12,14 @@ from sklearn.utils._param_validation import Interval
 from ..body.skeleton import Skeleton
 from ..inputs.types import RandomState
 from ..matching.counting import whole
-from ..utils.parameters import validated_function
+from ..utils.parameters import Rate, validated_function
 
 # Ranges of the parameters that all makers of data have.
 LIMITS = {
     "style": [Interval(Real, 0, 100, closed="both")],
     "warp": [Interval(Real, 0, 10, closed="both")],
     "noise": [Interval(Real, 0, 1000, closed="both")],
-    "frame_rate": [Interval(Real, 0.001, 10**9, closed="both")],
+    "frame_rate": [Rate(0.001, 10_000)],
     "random_state": ["random_state"],
 }
 # The five moments, as shares of the action.

@@ -12,8 +12,7 @@ from ..body.landmarks import as_tuple, guess_feet
 from ..body.skeleton import Skeleton, check_columns
 from ..inputs.collections import as_collection, check_members
 from ..inputs.numbers import nanmean
-from ..inputs.recorded import frame_rate_of_rows, frames_of_rows, start_of_rows
-from ..inputs.resampling import as_frame_rates
+from ..inputs.recorded import frame_rates_of, frames_of_rows, start_of_rows
 from ..inputs.tables import as_pandas, index_of, labels_of
 from ..inputs.wording import counted, within
 from ..matching.counting import runs_of, whole
@@ -167,16 +166,7 @@ class Recordings:
         return pd.concat([labels, pd.concat(tables, ignore_index=True)], axis=1)
 
     def _find_rates(self, frame_rate):
-        if frame_rate is not None:
-            rates = np.resize(as_frame_rates(frame_rate, len(self)), len(self)).tolist()
-        else:
-            rates = [frame_rate_of_rows(x) for x in self._given]
-        if None in rates:
-            i = rates.index(None)
-            raise ValueError(
-                f"The frame rate of {within(self.called(i))} is not known: give frame_rate=, or "
-                "tables whose attrs or index tell it."
-            )
+        rates = frame_rates_of(self._given, frame_rate, self.called)
         slowest, fastest = _RATES
         for i, rate in enumerate(rates):
             if not slowest <= rate <= fastest:

@@ -402,6 +402,8 @@ class _Source:
 
 def count_of(X):
     """The number of trials, or of rows."""
+    if isinstance(X, pd.DataFrame) and X.index.nlevels > 1:
+        return X.index.droplevel(-1).nunique()
     return X.shape[0] if hasattr(X, "shape") else len(X)
 
 

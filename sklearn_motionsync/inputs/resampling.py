@@ -1,6 +1,5 @@
 """The times of frames: as numbers, in order, without gaps, and evenly spaced or made so."""
 
-import math
 import reprlib
 from numbers import Real
 
@@ -8,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ..matching.counting import whole
+from ..matching.sizes import RATES
 from .numbers import as_numbers
 from .wording import counted
 
@@ -120,7 +120,8 @@ def interpolate(column, times, grid):
 
 def is_rate(value):
     """Whether a value is a number above 0 that can be a frame rate or a duration."""
-    return isinstance(value, Real) and not isinstance(value, bool) and 0 < value < math.inf
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    return is_number and RATES[0] <= value <= RATES[1]
 
 
 def rounded_rate(rate):
@@ -174,7 +175,8 @@ def as_frame_rates(frame_rate, n_sequences=None):
     Without a number of trials any count is right.
     """
     rate = as_numbers(frame_rate, "frame_rate", dtype=np.float64)
-    valid = (rate > 0) & np.isfinite(rate) & (np.asarray(frame_rate).dtype.kind != "b")
+    valid = (rate >= RATES[0]) & (rate <= RATES[1])
+    valid &= np.asarray(frame_rate).dtype.kind != "b"
     fits = rate.ndim < 2 if n_sequences is None else rate.shape in ((), (n_sequences,))
     if not fits or not valid.all():
         which = f": trial {int(np.argmin(valid))}" if rate.ndim and not valid.all() else ""

@@ -15,13 +15,12 @@ from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import (
     Recorded,
-    frame_rate_of_rows,
+    frame_rates_of,
     frames_of_rows,
     names_seconds,
     refuse_moved_events,
     start_of_rows,
 )
-from ..inputs.resampling import as_frame_rates
 from ..inputs.tables import (
     FRAME,
     TRIAL,
@@ -32,7 +31,6 @@ from ..inputs.tables import (
     name_trial,
 )
 from ..inputs.types import Table, TrialsLike, ValuesLike
-from ..inputs.wording import within
 from ..matching.counting import whole
 
 __all__ = [
@@ -394,18 +392,19 @@ def keyframes_from_events(
     refuse_moved_events(sequences)
     labels, levels = labels_of(sequences)
     trials = [name_trial(i, label) for i, label in enumerate(labels)]
+    in_seconds = False
     if events is None:
         listed = [_events_of(x, trial) for x, trial in zip(sequences, trials, strict=True)]
-        clocks = [frames_of_rows(x) for x in sequences]
     else:
         listed, in_seconds = _events_in(events, labels, levels[:-1])
-        clocks = [frames_of_rows(x) for x in sequences]
-        if in_seconds:
-            rates = _rates_of(sequences, trials, frame_rate)
-            clocks = [
-                start_of_rows(x) + np.arange(len(x)) / rate
-                for x, rate in zip(sequences, rates, strict=True)
-            ]
+    if in_seconds or frame_rate is not None:
+        rates = frame_rates_of(sequences, frame_rate, trials.__getitem__)
+    clocks = [frames_of_rows(x) for x in sequences]
+    if in_seconds:
+        clocks = [
+            start_of_rows(x) + np.arange(len(x)) / rate
+            for x, rate in zip(sequences, rates, strict=True)
+        ]
     columns = _Columns(names)
     rows = [
         _place(trial, trial_events, clock, columns)
@@ -503,20 +502,6 @@ def _as_text(label):
 
 
 # -- where they are in their trial ----------------------------------------------------------
-
-
-def _rates_of(sequences, trials, frame_rate):
-    """Frames per second of each trial."""
-    if frame_rate is not None:
-        rates = as_frame_rates(frame_rate, len(sequences))
-        return np.broadcast_to(rates, (len(sequences), 1))[:, 0]
-    rates = [frame_rate_of_rows(x) for x in sequences]
-    if None in rates:
-        raise ValueError(
-            f"events are in seconds, and the frame rate of {within(trials[rates.index(None)])} is "
-            "not known. Give frame_rate=, or an events table with frames."
-        )
-    return rates
 
 
 class _Columns:

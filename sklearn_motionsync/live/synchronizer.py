@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from numbers import Real
 from typing import Any, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, clone
-from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.facts import TIMELESS
@@ -29,7 +27,7 @@ from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
-from ..utils.parameters import validated_with_nested
+from ..utils.parameters import FRAME_RATE, validated_with_nested
 from .causal import CausalTrellis, causal_velocity
 from .stream import (
     LivePhase,
@@ -170,7 +168,7 @@ class OnlineSynchronizer(
 
     _parameter_constraints: dict = {
         "synchronizer": [Synchronizer, None],
-        "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
+        "frame_rate": [FRAME_RATE, None],
         "cyclic": ["boolean"],
     }
 

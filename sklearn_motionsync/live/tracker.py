@@ -24,7 +24,7 @@ from ..synchronizers.match import check_match
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
 from ..utils.parallel import LongWorkMixin, one_blas_thread
-from ..utils.parameters import validated
+from ..utils.parameters import FRAME_RATE, validated
 from .members import RunningTake, Track, filter_take, smooth_take, stack_frames
 from .state_space import Clock, TrackerModel
 from .stream import check_observations, check_times, times_of_each
@@ -163,7 +163,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         "n_particles": [Interval(Integral, 1, None, closed="left")],
         "noise": [Interval(Real, 0, LARGEST, closed="right"), JointNoise],
         "tempering": [Interval(Real, 0, None, closed="neither")],
-        "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
+        "frame_rate": [FRAME_RATE, None],
         "random_state": ["random_state"],
     }
 

@@ -6,7 +6,7 @@ None of them changes a result by more than rounding. Those of the tiles of the t
 
 import numpy as np
 
-__all__ = ["BATCH", "BATCH_NUMBERS", "CONSTANT", "EQUAL", "FRAMES"]
+__all__ = ["BATCH", "BATCH_NUMBERS", "CONSTANT", "EQUAL", "FRAMES", "RATES"]
 
 # Trials that are processed at a time, and numbers in an intermediate array.
 BATCH = 64
@@ -17,3 +17,5 @@ FRAMES = 100
 CONSTANT = 2.0**-44
 # Distances and costs that differ by less than this share of the energies are equal.
 EQUAL = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 2.0**-18}
+# Frame rates, and durations, in any unit of time, lie between these.
+RATES = 1e-12, 1e12

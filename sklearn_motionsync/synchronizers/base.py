@@ -18,7 +18,7 @@ from sklearn.base import (
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.collections import Trials, as_source
+from ..inputs.collections import Trials, as_source, count_of
 from ..inputs.features import check_input_features
 from ..inputs.keyframes import Keyframes
 from ..inputs.recorded import refuse_moved_events
@@ -520,7 +520,7 @@ class AnchoredSynchronizer(Synchronizer):
                 rows = Keyframes(keyframes, training.population, frame_rate)
                 training = training._replace(keyframes=rows.known(training.trials))
             elif frame_rate is not None:
-                as_frame_rates(frame_rate)
+                as_frame_rates(frame_rate, training.population)
             learnt = self._learn(training, progress)
         self.__dict__.update(learnt)
         return training
@@ -635,7 +635,7 @@ class AnchoredSynchronizer(Synchronizer):
             refuse_moved_events(X)
             params |= {"keyframes": keyframes, "frame_rate": frame_rate}
         elif frame_rate is not None:
-            as_frame_rates(frame_rate)
+            as_frame_rates(frame_rate, count_of(X))
         if confidence is not None:
             params["confidence"] = confidence
         return params

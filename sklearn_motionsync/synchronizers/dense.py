@@ -516,7 +516,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
                 f"trials, 0 to {len(trials) - 1}."
             )
         warper = self._warper
-        arrays, _ = self._for_warper(trials, keyframes, frame_rate)
+        arrays, _ = self._for_warper(trials, **self._given(X, keyframes, frame_rate))
         positions = warper.positions([arrays[trial]])
         frames, offsets, costs, path = warper.disparity_space(positions)
         costs = warper.matcher.features.back(costs)

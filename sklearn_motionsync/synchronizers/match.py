@@ -550,7 +550,7 @@ class Match:
         if check_unit(unit) == "seconds" or is_given:
             facts = self.facts_of(X, frame_rate)
         elif frame_rate is not None:
-            as_frame_rates(frame_rate)
+            as_frame_rates(frame_rate, len(self.times))
         if unit == "seconds":
             return self._stretched(frames, facts) / facts.known_rates()[:, np.newaxis]
         return frames * (100 / (self.times.shape[1] - 1) if unit == "percent" else 1)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from numbers import Real
 from typing import Any, Self
 
 import numpy as np
 from sklearn import get_config
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, TransformerMixin, clone
 from sklearn.utils import get_tags
-from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.metadata_routing import (
     MetadataRouter,
     MethodMapping,
@@ -22,7 +21,7 @@ from ..inputs.types import NamesLike, Transformed, TrialsLike, Unit
 from ..inputs.validation import restore
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
-from ..utils.parameters import validated_with_nested
+from ..utils.parameters import FRAME_RATE, validated_with_nested
 from .base import Synchronizer
 from .dense import DenseSynchronizer
 from .match import STANDARD, UNITS, Match, check_match
@@ -118,7 +117,7 @@ class TimingChannel(
     _parameter_constraints: dict = {
         "synchronizer": [Synchronizer],
         "unit": [StrOptions(set(UNITS))],
-        "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
+        "frame_rate": [FRAME_RATE, None],
         "errors": ["boolean"],
     }
 

@@ -22,12 +22,13 @@ from ..gait.recordings import FOOT_STRIKE, Recordings
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.resampling import as_frame_rates
 from ..inputs.types import TrialsLike, ValuesLike
 from ..inputs.validation import check_trials, names_of_input, warn_of_clocks
 from ..matching.counting import ROUNDING, first_largest, whole
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
-from ..utils.parameters import validated
+from ..utils.parameters import FRAME_RATE, validated
 from .cutting import as_takes, cut_takes
 from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
 from .stretches import (
@@ -187,7 +188,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         "incomplete": ["boolean"],
         "not_cyclic": [StrOptions({"raise", "skip"})],
         "period": [tuple, list, np.ndarray, None],
-        "frame_rate": [Interval(Real, 0, None, closed="neither"), "array-like", None],
+        "frame_rate": [FRAME_RATE, "array-like", None],
     }
 
     def __init__(
@@ -233,6 +234,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             ``not_cyclic="raise"``; no take is left; or there is no such `start`.
         """
         collection, takes = check_takes(self, X, reset=True)
+        if self.frame_rate is not None:
+            as_frame_rates(self.frame_rate, len(takes))
         strikes = strikes_of(self, collection) if self.start in STRIKES else None
         with self._progress(fits=True) as progress:
             step = progress.stage("correlating takes", len(takes))

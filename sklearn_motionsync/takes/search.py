@@ -30,7 +30,7 @@ from ..model.action_model import ActionModel
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.groups import encode_groups
 from ..utils.parallel import Progress
-from ..utils.parameters import validated_function
+from ..utils.parameters import FRAME_RATE, validated_function
 from ..utils.pipelines import (
     find_synchronizer,
     flat_steps,
@@ -71,7 +71,7 @@ _NO_SCORE = 1e-300
         "threshold": [Interval(Real, 0, 1, closed="both"), StrOptions({"auto"}), None],
         "coverage": [Interval(Real, 0, 1, closed="neither")],
         "max_hits": [Interval(Integral, 1, None, closed="left"), None],
-        "pattern_rate": [Interval(Real, 0, None, closed="neither"), None],
+        "pattern_rate": [FRAME_RATE, None],
         "verbose": ["verbose"],
     }
 )

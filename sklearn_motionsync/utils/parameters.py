@@ -2,14 +2,37 @@
 
 from collections.abc import Callable
 from inspect import currentframe
+from numbers import Real
 from typing import Any, TypeVar, cast
 
 from sklearn.base import _fit_context
-from sklearn.utils._param_validation import validate_params
+from sklearn.utils._param_validation import Interval, validate_params
 
-__all__ = ["error_of_old_name", "validated", "validated_function", "validated_with_nested"]
+from ..matching.sizes import RATES
+
+__all__ = [
+    "FRAME_RATE",
+    "Rate",
+    "error_of_old_name",
+    "validated",
+    "validated_function",
+    "validated_with_nested",
+]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+class Rate(Interval):
+    """The constraint of a frame rate: a number, and no truth value, from one border to another."""
+
+    def __init__(self, least, largest):
+        super().__init__(Real, least, largest, closed="both")
+
+    def is_satisfied_by(self, val):
+        return not isinstance(val, bool) and super().is_satisfied_by(val)
+
+
+FRAME_RATE = Rate(*RATES)
 
 
 def validated(method: _Function) -> _Function:

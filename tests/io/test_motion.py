@@ -122,10 +122,6 @@ def test_missing_file_is_an_error(tmp_path, ending):
         ({"asf": "a.asf"}, r"asf= goes with \.amc files only, got asf='a\.asf' with .*a\.bvh"),
         ({"group": "angles"}, r"group= goes with \.c3d files only, got group='angles' with .*a\.b"),
         *(
-            ({"frame_rate": rate}, "frame_rate must be frames a second, above 0, got")
-            for rate in (0, -1, np.nan, np.inf, "60")
-        ),
-        *(
             ({"max_gap": gap}, "max_gap must be a whole number of frames, 0 or more, got")
             for gap in (-1, 1.5, "5", True, None)
         ),

@@ -194,7 +194,6 @@ def test_uneven_times_are_kept_with_a_warning(fps, unit, words):
         (poses().astype(str), {}, "The position of poses must be numbers, got <U"),
         (poses().position, {"min_confidence": 0.5}, "needs a Dataset with the variable 'confid"),
         (poses(), {"min_confidence": "high"}, r"must be a number such as 0\.6, got 'high'"),
-        (poses(), {"frame_rate": 0}, "frame_rate must be frames a second, above 0, got 0"),
         (poses(), {"max_gap": None}, "max_gap must be a whole number of frames"),
         (poses(), {"max_gap": -1}, "max_gap must be a whole number of frames"),
     ],
