@@ -401,10 +401,11 @@ class _Source:
 
 
 def count_of(X):
-    """The number of trials, or of rows."""
+    """The number of trials, or of rows; None of what has none."""
     if isinstance(X, pd.DataFrame) and X.index.nlevels > 1:
         return X.index.droplevel(-1).nunique()
-    return X.shape[0] if hasattr(X, "shape") else len(X)
+    shape = getattr(X, "shape", ()) or (len(X) if hasattr(X, "__len__") else None,)
+    return shape[0]
 
 
 def select(X, indices):
