@@ -26,8 +26,8 @@ __all__ = [
 _GAP = 1.9
 # Times this share of a step from even ones are even.
 _EVEN = 1e-6
-# Rounding to digits of which a step has fewer than so many is no gap only where steps of both
-# lengths that it makes come often: so many, and this share of all.
+# Rounding to digits of which a step has fewer than so many is no gap only where the longer steps
+# that it makes come often: so many, and this share of all.
 _DIGITS_IN_STEP, _OFTEN, _OFTEN_SHARE = 3, 3, 0.08
 # The straight line by least squares misses rounded times by so much more than the nearest one.
 _LEAST_SQUARES = 1.1
@@ -148,16 +148,16 @@ def _slack(times):
 
 
 def _rounds_often(ticks):
-    """Whether steps of two neighbouring numbers of digits come often, as of rounded even times.
+    """Whether steps are of two neighbouring numbers of digits, and the longer ones no lost frames.
 
     Of 60 frames a second with two digits a third of the steps are 0.01 and the others 0.02. A lost
-    frame or two would be a longer step now and then.
+    frame or two would be a longer step now and then, and twice as long.
     """
     sizes, counts = np.unique(np.round(np.diff(ticks)), return_counts=True)
     return (
         len(sizes) == 2
         and sizes[1] - sizes[0] == 1
-        and counts.min() >= max(_OFTEN, _OFTEN_SHARE * len(ticks))
+        and (sizes[0] > 1 or counts[1] >= max(_OFTEN, _OFTEN_SHARE * len(ticks)))
     )
 
 

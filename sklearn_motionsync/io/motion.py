@@ -14,7 +14,7 @@ import pandas as pd
 
 from ..inputs.numbers import listed
 from ..inputs.recorded import SAME_RATE, is_thinned
-from ..inputs.resampling import is_rate
+from ..inputs.resampling import is_even, is_rate
 from ..inputs.tables import FRAME
 from ..inputs.types import Path
 from ..inputs.wording import counted
@@ -270,6 +270,8 @@ _JITTER = 0.1
 _MAX_JITTER = 0.45
 # A step this many times longer than it should be is a gap.
 _GAP = 1.9
+# Digits of less than this share of a step show each lost frame.
+_FINE = 0.1
 # Seconds; no recording has shorter steps.
 _SHORTEST_STEP = 1e-9
 
@@ -355,13 +357,19 @@ def _estimate_frame_rate(times, decimals, stated):
     # Times have few digits: 0.033, 0.067, 0.1.
     rate = float(f"{1 / step:.6g}")
     rounding = 10.0**-decimals
-    # With few frames the digits leave the rate uncertain.
-    blur = rounding / (len(times) - 1)
-    agree = stated is not None and abs(step - 1 / stated) < max(
-        SAME_RATE / stated, min(blur, step / 4)
-    )
+    # A lost frame makes the mean step longer, and not the median.
+    steps = np.diff(times)
+    has_gap = steps.max() >= _GAP * max(np.median(steps), rounding)
     off = times - step * np.arange(len(times))
-    even = np.ptp(off) / 2 <= min(_JITTER * step + rounding / 2, _MAX_JITTER * step)
-    if agree and (even or np.diff(times).max() < _GAP * max(step, rounding)):
-        return stated, True
+    jitters = np.ptp(off) / 2 <= min(_JITTER * step + rounding / 2, _MAX_JITTER * step)
+    even = is_even(times) or (jitters and not has_gap)
+    if stated is not None:
+        # With few frames the digits leave the rate uncertain. Coarse ones hide a lost frame, which
+        # the duration shows.
+        blur = min(rounding / (len(times) - 1), step / 4)
+        agree = abs(step - 1 / stated) < max(SAME_RATE / stated, blur)
+        lost = abs((times[-1] - times[0]) * stated - len(steps)) > max(0.5, rounding * stated)
+        is_fine = rounding * stated < _FINE
+        if agree and (even or not (has_gap or (lost and not is_fine))):
+            return stated, True
     return (rate, True) if even else (None, False)

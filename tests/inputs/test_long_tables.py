@@ -254,12 +254,14 @@ def test_rounded_times_are_even(rate, unit):
     [
         np.round(np.arange(400) / 30, 2),
         np.round(np.arange(48) / 24, 2),
+        np.round(np.arange(30) / 48, 2),
+        np.round(4 + np.arange(200) / 51.2, 2),
         np.round(np.arange(120) / 60, 2),
         np.round(17.3 + np.arange(300) / 90, 2),
         np.round(np.arange(480) / 240, 3),
         (np.arange(6000) / 60).astype("f4"),
     ],
-    ids=["30 Hz", "24 Hz", "60 Hz", "90 Hz", "240 Hz", "single precision"],
+    ids=["30 Hz", "24 Hz", "48 Hz", "51.2 Hz", "60 Hz", "90 Hz", "240 Hz", "single precision"],
 )
 def test_coarse_times_are_even(time):
     df = pd.DataFrame({"t": time, "x": np.sin(time.astype(float))})

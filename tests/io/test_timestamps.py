@@ -82,6 +82,22 @@ def test_a_lost_frame_makes_times_uneven(lost, stated):
 
 
 @pytest.mark.parametrize(
+    ("rate", "digits"),
+    [(48, 2), (51.2, 2), (59.94, 2), (60, 2), (72, 2), (90, 2), (119.88, 3), (150, 3), (240, 3)],
+)
+@pytest.mark.parametrize("decimals", [None, 17])
+@pytest.mark.parametrize("n_frames", [60, 500])
+def test_few_digits_are_even_and_show_each_lost_frame(rate, digits, decimals, n_frames):
+    times = np.round(12.34 + np.arange(n_frames) / rate, digits)
+    of_file = {"decimals": decimals or digits}
+    mean = (n_frames - 1) / (times[-1] - times[0])
+    assert described(times, **of_file)["frame_rate"] == pytest.approx(mean, rel=1e-5)
+    for stated in (None, rate) if decimals is None else (None,):
+        with pytest.warns(UserWarning, match="uneven"):
+            describe_times("a", np.delete(times, n_frames // 2), stated=stated, **of_file)
+
+
+@pytest.mark.parametrize(
     ("decimals", "off", "even"),
     [
         # A tenth of a step and half a digit; at most 0.45 of a step.
