@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import frame_rate_of_rows, start_of_rows
 from ..inputs.types import Path, Table, TrialLike
 from ..inputs.wording import counted
+from ..utils.files import check_path, write_whole
 from .motion import check_frame_rate, read_motion
 
 __all__ = [
@@ -50,7 +50,8 @@ def write_motion(
     Parameters
     ----------
     path : str or path-like
-        The file, whose name ends with ``.bvh``, ``.trc``, ``.mot`` or ``.sto``. It is replaced.
+        The file, whose name ends with ``.bvh``, ``.trc``, ``.mot`` or ``.sto``. It is
+        replaced once the new one is complete.
     X : array (n_frames, n_features) or DataFrame
         Joint positions, joint by joint x, y, z; for MOT and STO a table of any columns.
     skeleton : Skeleton, default=None
@@ -94,7 +95,7 @@ def write_motion(
     >>> bool(abs(df.to_numpy() - bending.data[0]).max() < 0.02)  # metres
     True
     """
-    path = FilePath(path)
+    path = check_path(path, "motion.bvh")
     ending = path.suffix.lower()
     if ending not in _ENDINGS:
         raise ValueError(
@@ -118,7 +119,7 @@ def write_motion(
             text = _write_trc(joints, points, rate, start, getattr(X, "attrs", {}), path)
         else:
             text = _write_bvh(joints, parents, points, up, rate, _rig_like(like, X, path), path)
-    path.write_text(text, encoding="utf-8", newline="\n")
+    write_whole(path, text)
 
 
 def _read_positions(X, skeleton, path):

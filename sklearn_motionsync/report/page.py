@@ -3,8 +3,7 @@
 import base64
 import datetime
 import json
-import pathlib
-import uuid
+import re
 from html import escape
 from importlib.resources import files
 from io import BytesIO
@@ -14,10 +13,10 @@ import numpy as np
 
 from ..display.base import pyplot
 from ..matching.counting import whole
+from ..utils.files import write_whole
 
 __all__ = [
     "Page",
-    "check_path",
     "list_of",
     "number",
     "paragraph",
@@ -28,6 +27,8 @@ __all__ = [
 
 # Pixels an inch of the figures.
 DPI = 180
+# Where a spreadsheet would begin to read a formula.
+_FORMULA = re.compile(r'(?:^|(?<=[;\t\r\n]))(?="*[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20])')
 
 
 class Page:
@@ -62,18 +63,7 @@ class Page:
         # The version is known once the package is imported.
         from .. import __version__
 
-        text = self.render(str(title), __version__)
-        # The file that a link leads to is replaced, and keeps its permissions.
-        target = path.resolve()
-        beside = target.with_name(f".{uuid.uuid4().hex}")
-        try:
-            beside.touch()
-            if target.exists():
-                beside.chmod(target.stat().st_mode & 0o777)
-            beside.write_text(text, encoding="utf-8", newline="\n")
-            beside.replace(target)
-        finally:
-            beside.unlink(missing_ok=True)
+        write_whole(path, self.render(str(title), __version__))
         return path
 
     def render(self, title, version):
@@ -103,33 +93,12 @@ class Page:
         )
 
 
-def check_path(path, what):
-    """A path at which a file can be written.
-
-    Parameters
-    ----------
-    path : str or path
-    what : str
-        What is written, for messages.
-    """
-    path = pathlib.Path(path)
-    if path.exists() and not path.is_file():
-        raise ValueError(
-            f"path must be that of a file, such as '{what}.html'; {str(path)!r} is a folder or a "
-            "device."
-        )
-    if not path.parent.is_dir():
-        raise FileNotFoundError(
-            f"There is no folder {str(path.parent)!r} for the {what} {path.name!r}: make it by "
-            "Path.mkdir(parents=True), or give the path of another file."
-        )
-    return path
-
-
 def _without_formula(value):
-    """Text that a spreadsheet would run as a formula, behind an apostrophe; or the value."""
-    is_formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
-    return f"'{value}" if is_formula else value
+    """Text with an apostrophe before all that a spreadsheet would run as a formula; or the value.
+
+    Spreadsheets of other languages take a semicolon for the end of a cell, and wide signs as well.
+    """
+    return _FORMULA.sub("'", value) if isinstance(value, str) else value
 
 
 def read_part(name):

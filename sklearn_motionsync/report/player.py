@@ -27,8 +27,9 @@ from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import NamesLike, NumbersLike, Path, Table, TrialsLike, ValuesLike
 from ..inputs.wording import counted
 from ..synchronizers.match import Match, match_of_times
+from ..utils.files import check_path
 from ..utils.pipelines import transform_through, union_transformers
-from .page import Page, check_path, paragraph, read_part
+from .page import Page, paragraph, read_part
 
 __all__ = ["add_player_of", "player_of", "write_player"]
 
@@ -117,7 +118,7 @@ def write_player(
     >>> path.read_text(encoding="utf-8")[:15]
     '<!DOCTYPE html>'
     """
-    path = check_path(path, "player")
+    path = check_path(path, "player.html")
     trials = as_trials(X)
     n = len(trials)
     if n > MOST_SHOWN:

@@ -44,9 +44,10 @@ from ..inputs.types import (
 from ..inputs.wording import counted
 from ..matching.counting import first_largest
 from ..synchronizers.match import UNITS, Match
+from ..utils.files import check_path
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern
-from .page import Page, check_path, list_of, number, paragraph, picture, table_of
+from .page import Page, list_of, number, paragraph, picture, table_of
 from .player import add_player_of
 
 __all__ = ["TrialSet", "draw_offsets", "draw_signals", "own_figures", "write_report"]
@@ -145,7 +146,7 @@ def write_report(
     >>> path.read_text(encoding="utf-8")[:15]
     '<!DOCTYPE html>'
     """
-    path = check_path(path, "report")
+    path = check_path(path, "report.html")
     with own_figures():
         aligned = AlignedCurves.of(
             estimator,

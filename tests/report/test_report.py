@@ -9,6 +9,7 @@ import sys
 from html import escape
 from html.parser import HTMLParser
 from operator import itemgetter
+from unittest.mock import Mock
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -27,6 +28,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.comparison import compare_groups
 from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.io import write_motion
 from sklearn_motionsync.report import page, player, report, write_player, write_report
 
 GAIT = make_gait(8, 2, timing=8, random_state=0)
@@ -587,27 +589,47 @@ def test_refused_paths(tmp_path):
             write_report(path, SYNC, TRIALS)
 
 
-def test_a_file_is_replaced_where_a_link_leads_and_keeps_its_readers(tmp_path):
-    target, link = tmp_path / f"{'x' * 240}.html", tmp_path / "link.html"
+@pytest.mark.parametrize("ending", [".html", ".bvh", ".trc"])
+def test_a_file_is_replaced_where_a_link_leads_and_keeps_its_readers(tmp_path, monkeypatch, ending):
+    target, link = tmp_path / f"{'x' * 240}{ending}", tmp_path / f"link{ending}"
     target.write_text("old")
     target.chmod(0o600)
     link.symlink_to(target)
     bends = make_bending(2, n_frames=20, random_state=0)
-    write_player(link, bends.data, bends.skeleton)
+
+    def write():
+        if ending == ".html":
+            write_player(link, bends.data, bends.skeleton)
+        else:
+            write_motion(link, bends.data[0], bends.skeleton, frame_rate=50)
+
+    with monkeypatch.context() as full:
+        full.setattr("pathlib.Path.write_bytes", Mock(side_effect=OSError("No space left")))
+        with pytest.raises(OSError, match="No space left"):
+            write()
+    assert target.read_text() == "old"
+    write()
     assert link.is_symlink()
-    assert target.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert len(target.read_text(encoding="utf-8")) > 1000
     assert target.stat().st_mode & 0o777 == 0o600
     assert sorted(tmp_path.iterdir()) == sorted([target, link])
 
 
 def test_no_spreadsheet_runs_what_users_give(tmp_path):
     """Names that begin as a formula stand behind an apostrophe in the files of the report."""
-    people = ['=HYPERLINK("http://x")', "+1", "@a", "-b"] * (len(TRIALS) // 4 + 1)
-    path = write_report(
-        tmp_path / "a.html", LINEAR, TRIALS, groups=people[: len(TRIALS)], features=0
+    hostile = ['=HYPERLINK("http://x")', "+1", "@a", "-b", "\t=1", "\n=1", "x;=1", '"=1', "\uff1d1"]
+    escaped = [f"'{text}" for text in hostile]
+    escaped[4:7] = ["'\t'=1", "'\n'=1", "x;'=1"]
+    people = [hostile[k % len(hostile)] for k in range(len(TRIALS))]
+    tables = [x.rename(columns=dict(zip(x, hostile, strict=False))) for x in TRIALS]
+    sync = LinearSynchronizer(20).fit(tables)
+    path = write_report(tmp_path / "a.html", sync, tables, groups=people, features=0)
+    trials, curves = (
+        pd.read_csv(io.StringIO(Text(path).data["files"][name]))
+        for name in ("trials.csv", "aligned_curves.csv")
     )
-    table = pd.read_csv(io.StringIO(Text(path).data["files"]["trials.csv"]))
-    assert table["person"].tolist()[:4] == ['\'=HYPERLINK("http://x")', "'+1", "'@a", "'-b"]
+    assert trials["person"].tolist()[: len(escaped)] == escaped[: len(trials)]
+    assert list(curves)[-1] == f"{escaped[0]} (deg)"
 
 
 def test_a_missing_matplotlib_is_named(tmp_path, monkeypatch):
