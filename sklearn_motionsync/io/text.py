@@ -314,8 +314,8 @@ _COMPONENTS = {
     b"spatialvec": "123456",
 }
 _FORCES = ("force", "torque", "moment")
-_ANGLE_UNITS = {b"yes": "deg", b"true": "deg", b"1": "deg"}
-_ANGLE_UNITS |= {b"no": "rad", b"false": "rad", b"0": "rad"}
+_ANGLE_UNITS = dict.fromkeys((b"yes", b"y", b"true", b"1"), "deg")
+_ANGLE_UNITS |= dict.fromkeys((b"no", b"n", b"false", b"0"), "rad")
 
 
 def read_storage(path):
@@ -348,7 +348,7 @@ def _read_header(text):
     """The values above 'endheader' by their names, both in small letters."""
     header = {}
     while row := text.row().strip():
-        row = row.lower()
+        row = b" ".join(row.lower().split())
         if row == b"endheader":
             return header
         key, _, value = row.partition(b"=" if b"=" in row else b" ")

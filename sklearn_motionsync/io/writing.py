@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +19,7 @@ from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import frame_rate_of_rows, start_of_rows
 from ..inputs.types import Path, Table, TrialLike
 from ..inputs.wording import counted
+from ..matching.counting import whole
 from ..utils.files import check_path, write_whole
 from .motion import check_frame_rate, read_motion
 
@@ -29,8 +32,10 @@ __all__ = [
 ]
 
 _ENDINGS = (".bvh", ".trc", ".mot", ".sto")
-# Digits behind the point, of positions and degrees.
+# Digits behind the point, of positions, degrees and seconds.
 _DIGITS = 6
+# Degrees and radians, and their rates, among units.
+_ANGLE = re.compile(r"(deg|rad)(ree|ian)?s?\b", re.IGNORECASE)
 
 
 def write_motion(
@@ -53,7 +58,8 @@ def write_motion(
         The file, whose name ends with ``.bvh``, ``.trc``, ``.mot`` or ``.sto``. It is
         replaced once the new one is complete.
     X : array (n_frames, n_features) or DataFrame
-        Joint positions, joint by joint x, y, z; for MOT and STO a table of any columns.
+        Joint positions, joint by joint x, y, z; for MOT and STO a table of any columns. Its header
+        says "inDegrees" if ``X.attrs["units"]`` are degrees or radians, or these a second.
     skeleton : Skeleton, default=None
         Which columns are which joints, for arrays. By default a table tells.
     like : str, path-like or DataFrame, default=None
@@ -95,7 +101,7 @@ def write_motion(
     >>> bool(abs(df.to_numpy() - bending.data[0]).max() < 0.02)  # metres
     True
     """
-    path = check_path(path, "motion.bvh")
+    path = FilePath(check_path(path, "motion.bvh"))
     ending = path.suffix.lower()
     if ending not in _ENDINGS:
         raise ValueError(
@@ -113,6 +119,7 @@ def write_motion(
         text = _write_storage(X, rate, start, path)
     else:
         joints, parents, points, up = _read_positions(X, skeleton, path)
+        _printable(joints, path)
         if in_place:
             points = _in_place(points, parents, up)
         if ending == ".trc":
@@ -226,7 +233,7 @@ def _write_trc(joints, points, rate, start, attrs, path):
     units = attrs.get("units") if isinstance(attrs.get("units"), str) else "m"
     n_frames, first = len(points), attrs.get("first_frame") or 1
     keys = "DataRate CameraRate NumFrames NumMarkers Units OrigDataRate OrigDataStartFrame"
-    values = [f"{rate:g}"] * 2 + [n_frames, len(joints), units, f"{rate:g}", first, n_frames]
+    values = [f"{rate:.9g}"] * 2 + [n_frames, len(joints), units, f"{rate:.9g}", first, n_frames]
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
         "\t".join([*keys.split(), "OrigNumFrames"]),
@@ -235,9 +242,10 @@ def _write_trc(joints, points, rate, start, attrs, path):
         "\t\t" + "\t".join(f"{axis}{j + 1}" for j in range(len(joints)) for axis in "XYZ"),
         "",
     ]
-    for k, row in enumerate(points.reshape(n_frames, -1)):
+    rows = zip(_times(n_frames, rate, start), points.reshape(n_frames, -1), strict=True)
+    for k, (time, row) in enumerate(rows):
         numbers = ["" if np.isnan(v) else f"{v:.{_DIGITS}f}" for v in row]
-        lines.append("\t".join([str(first + k), f"{start + k / rate:.6f}", *numbers]))
+        lines.append("\t".join([str(first + k), time, *numbers]))
     return "\n".join(lines) + "\n"
 
 
@@ -246,20 +254,39 @@ def _write_storage(X, rate, start, path):
         raise ValueError(f"{path}: give a DataFrame, whose columns have names.")
     values = as_numbers(X, f"{path}: X", dtype=np.float64)
     check_finite(values, f"{path}: frame", [str(name) for name in X.columns], allow_nan=True)
-    units = units_of_columns(X)
-    angles = {unit: name for name, unit in units.items() if unit in ("deg", "rad")}
+    angles = {
+        kind[1].lower(): name
+        for name, unit in units_of_columns(X).items()
+        if (kind := _ANGLE.match(unit.replace("°", "deg")))
+    }
     if len(angles) > 1:
         raise ValueError(
             f"{path}: {angles['deg']!r} is in degrees and {angles['rad']!r} in radians; a file has "
             "one of them. Convert, and set X.attrs['units']."
         )
-    in_degrees = "no" if "rad" in angles else "yes"
-    lines = [path.stem, "version=1", f"nRows={len(X)}", f"nColumns={1 + X.shape[1]}"]
-    lines += [f"inDegrees={in_degrees}", "endheader", "\t".join(["time", *map(str, X.columns)])]
-    times = start + np.arange(len(X)) / rate
-    for time, row in zip(times, values, strict=True):
-        lines.append("\t".join([f"{time:.6f}", *(f"{v:.8g}" for v in row)]))
+    lines = [re.sub(r"[\s=]+", "_", path.stem), "version=1", f"nRows={len(X)}"]
+    lines += [f"nColumns={1 + X.shape[1]}"]
+    # Without angles nothing is said of them.
+    lines += [f"inDegrees={'yes' if kind == 'deg' else 'no'}" for kind in angles]
+    lines += ["endheader", "\t".join(["time", *_printable(X.columns, path)])]
+    for time, row in zip(_times(len(X), rate, start), values, strict=True):
+        lines.append("\t".join([time, *(f"{v:.8g}" for v in row)]))
     return "\n".join(lines) + "\n"
+
+
+def _times(n_frames, rate, start):
+    """The times of frames as text, of which those of a high rate have more digits."""
+    digits = _DIGITS + max(0, whole(np.log10(rate), "up"))
+    return [f"{time:.{digits}f}" for time in start + np.arange(n_frames) / rate]
+
+
+def _printable(names, path):
+    """Names as text; those with what ends a name, such as a tab, are refused."""
+    names, ends = list(map(str, names)), r"[\t-\r]" + "|[{}]" * (path.suffix.lower() == ".bvh")
+    for name in names:
+        if not name.strip() or re.search(ends, name):
+            raise ValueError(f"{path}: such a file cannot have the name {name!r}: rename it.")
+    return names
 
 
 # -- rigs ------------------------------------------------------------------------------------------

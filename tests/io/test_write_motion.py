@@ -14,6 +14,8 @@ from plain_readers import plain_bvh
 
 BENDING = make_bending(6, random_state=0)
 LEG = 0.85
+BRACE = pd.DataFrame(0.0, [0, 1], ["a{_x", "a{_y", "a{_z"])
+BRACE.attrs |= {"joints": ["a{"], "parents": [-1]}
 
 
 def written(tmp_path, X, *args, name="out.bvh", **how):
@@ -172,18 +174,27 @@ def test_trc_is_read_back(tmp_path):
 @pytest.mark.parametrize("ending", [".mot", ".sto"])
 def test_tables_of_opensim_are_read_back(tmp_path, ending):
     angles = pd.DataFrame({"knee": [1.5, 2.25, 3.0], "hip": [0.0, -1e-3, 4e5]})
-    found = written(tmp_path, angles, name=f"out{ending}", frame_rate=50)
-    np.testing.assert_allclose(found, angles)
-    assert found.attrs["frame_rate"] == 50
-    assert found.attrs["units"] == "deg"
+    for rate in (0.5, 50, 59.94, 2400, 1e5, 1e7):
+        found = written(tmp_path, angles, name=f"inDegrees=no{ending}", frame_rate=rate)
+        np.testing.assert_allclose(found, angles)
+        assert found.attrs["frame_rate"] == pytest.approx(rate, rel=1e-5)
+        assert found.attrs["units"] is None
 
 
-@pytest.mark.parametrize("units", ["rad", "Radians", "rads", ["rad", "radian"], ["rad", "m"]])
-def test_radians_stay_radians(tmp_path, units):
+@pytest.mark.parametrize(
+    ("units", "expected"),
+    [
+        *((unit, "rad") for unit in ("rad", "Radians", "rads", ["rad", "radian"], ["rad", "m"])),
+        *((unit, "rad") for unit in ("rad/s", "radians/s", ["m", "rad/s²"])),
+        *((unit, "deg") for unit in ("deg", "Degrees", "°", "deg/s", "°/s", ["m", "degrees/s"])),
+        *((unit, None) for unit in (None, "mm", "N", "radial", "grad", ["m", "N"])),
+    ],
+)
+def test_radians_stay_radians(tmp_path, units, expected):
     angles = pd.DataFrame({"knee": [0.1, 0.2, 0.3], "hip": [1.0, 2.0, 3.0]})
     angles.attrs["units"] = units
     found = written(tmp_path, angles, name="out.sto", frame_rate=50)
-    assert found.attrs["units"] == "rad"
+    assert found.attrs["units"] == expected
     angles.attrs["units"] = ["rad", "deg"]
     with pytest.raises(ValueError, match="'hip' is in degrees and 'knee' in radians"):
         write_motion(tmp_path / "b.sto", angles, frame_rate=50)
@@ -200,6 +211,11 @@ def test_radians_stay_radians(tmp_path, units):
         ({"X": np.zeros((4, 44))}, "X has 44 columns, and 15 joints need 45"),
         ({"name": "a.trc", "like": "b.bvh"}, "like= goes with .bvh files only"),
         ({"name": "a.mot"}, "give a DataFrame, whose columns have names"),
+        *(
+            ({"name": "a.sto", "X": pd.DataFrame({name: [1.0, 2]})}, "cannot have the name")
+            for name in ("", " ", "a\tb", "a\nb")
+        ),
+        ({"X": BRACE, "skeleton": None}, r"such a file cannot have the name 'a\{'"),
         (
             {"name": "a.sto", "X": pd.DataFrame({"a": [1.0, np.inf]})},
             r"frame 1, feature 0 \('a'\) is infinity",
