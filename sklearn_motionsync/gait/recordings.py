@@ -157,6 +157,11 @@ class Recordings:
                     "recordings."
                 )
             by_recording[i].append((label, side, float(at)))
+        if len(table) and not any(by_recording):
+            raise ValueError(
+                f"events: none of {counted(len(table), 'row')} has a label {FOOT_STRIKE!r} or "
+                f"{FOOT_OFF!r}, a context 'Left' or 'Right', and a {time} that is known."
+            )
         return [sorted(events_of_one, key=lambda event: event[2]) for events_of_one in by_recording]
 
     def stack(self, tables):

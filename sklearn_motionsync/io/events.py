@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.collections import as_collection
-from ..inputs.numbers import as_numbers
+from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import (
     Recorded,
     frame_rates_of,
@@ -177,7 +177,8 @@ def _read_events(df, name):
         raise ValueError(f"{name} has no events; {_HELP}.")
     for event in events:
         has_label = isinstance(event, dict) and isinstance(event.get("label"), str)
-        if not has_label or not isinstance(event.get("frame"), Real | None):
+        frame = event.get("frame") if has_label else ""
+        if not isinstance(frame, Real | None) or frame in (math.inf, -math.inf):
             raise ValueError(f"{name}: {_HELP}, got {repr(event)[:100]} among them.")
     placed = [e for e in events if e.get("frame") is not None and math.isfinite(e["frame"])]
     if not placed:
@@ -459,6 +460,7 @@ def _events_in(events, labels, levels):
             f"{', '.join(map(repr, keys))}], var_name='event', value_name='frame')."
         )
     times = as_numbers(table[time], f"events: column {time!r}", dtype=np.float64)
+    check_finite(times[:, np.newaxis], "events: row", [time], allow_nan=True)
     contexts = table[columns[_CONTEXT]] if _CONTEXT in columns else [None] * len(table)
     places = {_as_text(name): i for i, name in enumerate(labels)}
     listed = [[] for _ in labels]

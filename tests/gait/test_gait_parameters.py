@@ -57,6 +57,9 @@ def test_given_events_count():
         frame_rate=100,
     )  # fmt: skip
     pd.testing.assert_frame_equal(found, expected)
+    for lost in ({"frame": np.nan}, {"label": "RHS"}, {"context": "General"}):
+        with pytest.raises(ValueError, match=rf"none of {len(events)} rows has a label"):
+            gait_parameters(walk.data, walk.skeleton, events=events.assign(**lost), frame_rate=100)
     # A strike that is missing leaves its strides out; it does not make long ones.
     strikes = events.index[(events["label"] == "Foot Strike") & (events["context"] == "Left")]
     fewer = events.drop(strikes[2])

@@ -146,6 +146,7 @@ def test_events_within_trials_are_keyframes():
         (recording(("a", None, None)), "a", None, "have no frames, as its file has no frame rate"),
         (recording(("a", None, "7")), "a", None, "must be a list of dicts .*, got {'label': 'a'"),
         (recording((1, None, 7)), "a", None, "must be a list of dicts"),
+        (recording((*LEFT, 7), (*LEFT, np.inf)), "a", None, "must be a list of dicts .*, got"),
         (pd.Series([1.0]), "a", None, "must be a DataFrame, as read_motion returns it, got Series"),
     ],
 )

@@ -146,6 +146,7 @@ BAD = {
     "no level": (table().drop(columns="trial"), "no column 'trial', a level of the labels of X"),
     "text": (changed(frame="soon"), "events: column 'frame'"),
     "nothing": (table().assign(frame=np.nan), "No trial has an event"),
+    "never": (changed(frame=-np.inf), r"events: row 0, .* \('frame'\) is infinity"),
     "a list": ([{"event": "x"}], "must be a DataFrame of pandas or polars, got list"),
 }  # fmt: skip
 
