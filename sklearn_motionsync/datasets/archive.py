@@ -10,7 +10,8 @@ from sklearn.utils import Bunch
 from ..body.skeleton import Skeleton, find_cycle
 from ..inputs.numbers import check_finite
 from ..inputs.types import Path
-from ..io.text import check_result_size
+from ..io.text import FARTHEST, check_result_size
+from ..matching.sizes import RATES
 
 _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "parents")
 _TEXTS = ("label", "actor", "take", "joints")
@@ -25,7 +26,7 @@ def load_trials(path: Path) -> Bunch:
         A NumPy archive (``.npz``) with ``positions`` (sum of frames, joints, 3);
         ``offsets`` (N + 1,), trial i being ``positions[offsets[i]:offsets[i + 1]]``;
         ``label``, ``actor``, ``take`` and ``fps`` (N,); ``joints`` and ``parents`` (joints,).
-        Every trial has at least two frames, and every position is finite. Parents are
+        Every trial has at least two frames, and every position is finite and below 1e7. Parents are
         indices of joints, -1 for a root. Labels, actors and takes are text or whole numbers.
 
     Returns
@@ -82,6 +83,13 @@ def load_trials(path: Path) -> Bunch:
     columns = [f"{joint}_{axis}" for joint in joints for axis in "xyz"]
     for i, x in enumerate(data):
         check_finite(x, f"{path}: trial {i}, frame", columns)
+        frame, column = np.unravel_index(np.abs(x).argmax(), x.shape)
+        if abs(x[frame, column]) > FARTHEST:
+            raise ValueError(
+                f"{path}: trial {i}, frame {frame}: {columns[column]!r} is {x[frame, column]:.3g}. "
+                f"No recording has positions beyond {FARTHEST:g}: the archive is damaged, or in "
+                "another unit."
+            )
     return Bunch(
         data=data,
         target=texts["label"],
@@ -162,7 +170,7 @@ def _check_parents(path, parents, joints):
 
 
 def _check_frame_rates(path, fps):
-    if fps.dtype.kind not in "iuf" or ((fps <= 0) | np.isinf(fps)).any():
+    if fps.dtype.kind not in "iuf" or ((fps < RATES[0]) | (fps > RATES[1])).any():
         raise ValueError(
             f"{path}: fps must be frames per second, above 0, or NaN if it is not known, got "
             f"{_quote(fps)}."
@@ -182,7 +190,8 @@ def _read_arrays(path):
             n_bytes = sum(member.file_size for member in archive.infolist())
         check_result_size(path, path.stat().st_size, n_bytes, "the arrays")
         with np.load(path) as archive:
-            arrays = {name: archive[name] for name in _NEEDED if name in archive}
+            # What is no array is read as bytes.
+            arrays = {name: np.asarray(archive[name]) for name in _NEEDED if name in archive}
     except Exception as error:  # of zipfile, zlib, tokenize, ast, struct: any byte may be wrong
         if isinstance(error, ValueError) and str(error).startswith(f"{path}: "):
             raise

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 
+from ..inputs.resampling import is_rate
 from ..inputs.wording import counted
 from .text import decode, make_unique
 
@@ -34,7 +35,7 @@ def read_c3d(path, *, group="markers"):
     n_points, n_stated, per_frame = _read_counts(file, parameters)
     frames = _Frames(file, parameters, n_points, n_stated, per_frame)
     rate = parameters.number("POINT", "RATE", file.float(20))
-    rate = float(rate) if math.isfinite(rate) and rate > 0 else None
+    rate = float(rate) if is_rate(rate) else None
     labels = _read_labels(parameters, "POINT", n_points, "marker")
     members = _read_point_groups(parameters, labels)
     groups = {

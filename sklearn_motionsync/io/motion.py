@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from ..inputs.numbers import listed
+from ..inputs.numbers import LARGEST, listed
 from ..inputs.recorded import SAME_RATE, is_thinned
 from ..inputs.resampling import is_even, is_rate
 from ..inputs.tables import FRAME
@@ -22,7 +22,7 @@ from .acclaim import read_acclaim
 from .bvh import read_bvh
 from .c3d import MissingGroup, read_c3d
 from .gaps import check_filling, fill_gaps, warn_of_gaps
-from .text import read_storage
+from .text import FARTHEST, read_storage
 from .trc import read_trc
 
 # The readers, by the ending of the file's name in small letters. A format is one function and one
@@ -119,12 +119,14 @@ def read_motion(
         If there is no such file.
     ValueError
         If the ending is not known, or the file is damaged or not complete; the message names the
-        line or byte. If the result would take more than 64 MB and 32 times the size of the file.
+        line, byte or frame. If the result would take more than 64 MB and 32 times the size of the
+        file.
 
     Warns
     -----
     UserWarning
-        If positions or values are missing; if times are uneven, or contradict the frame rate that
+        If positions or values are missing, or beyond those of any recording, so that they become
+        NaN; if times are uneven, or contradict the frame rate that
         the file states, unless `frame_rate` is given; if a file or columns of several are left
         out; if a C3D file states two scales.
 
@@ -157,6 +159,7 @@ def read_motion(
         return _read_several(path, columns, options)
     path = FilePath(path)
     motion = _read_file(path, options)
+    _hide_damage(motion, path)
     if "times" in motion:
         motion |= describe_times(
             path.name,
@@ -192,6 +195,30 @@ def _read_file(path, options):
                 f"{name}= goes with {_join(endings)} files only, got {name}={value!r} with {path}."
             )
     return reader(path, **options)
+
+
+def _hide_damage(motion, path):
+    """What is larger than any recording, as of a flipped bit, becomes NaN, or is refused."""
+    kind, joints = motion["kind"], motion.get("joints")
+    values = motion["values"] if joints is None else motion["positions"]
+    limit = FARTHEST if kind in ("joints", "markers", "angles") else LARGEST
+    damaged = np.abs(values) > limit
+    if not damaged.any():
+        return
+    frame, column, *axis = np.argwhere(damaged)[0].tolist()
+    name = motion["channels"][column] if joints is None else f"{joints[column]}_{'xyz'[axis[0]]}"
+    found = f"frame {frame} of {name[:60]!r} is {values[frame, column, *axis]:.3g}"
+    beyond = f"No recording has numbers beyond {limit:g}: the file is damaged, or in another unit."
+    # Joints of a skeleton are always seen.
+    if kind == "joints" or 2 * damaged.sum() > damaged.size:
+        raise ValueError(f"{path}: {found}. {beyond}")
+    values[damaged if joints is None else damaged.any(axis=2)] = np.nan
+    warnings.warn(
+        f"{path.name}: {found}, the first of {counted(damaged.sum(), 'number')} that become "
+        f"missing (NaN). {beyond}",
+        UserWarning,
+        stacklevel=3,
+    )
 
 
 def _read_several(paths, columns, options):

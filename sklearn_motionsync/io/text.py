@@ -8,10 +8,11 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 
+from ..inputs.resampling import is_rate
 from ..inputs.wording import counted
 
-# No number of a recording is larger, in any unit.
-_LARGEST = 1e12
+# No number of a file is larger, in any unit; and no position or angle: 10 km in millimetres.
+_LARGEST, FARTHEST = 1e12, 1e7
 # Bytes of a table that are parsed at once: memory beside the file and its numbers stays constant.
 PORTION = 2**22
 # The characters of plain decimal numbers and of the blanks between them.
@@ -235,7 +236,7 @@ def read_rate(word):
         rate = float(word)
     except ValueError:
         return None
-    return rate if 0 < rate < math.inf else None
+    return rate if is_rate(rate) else None
 
 
 def _numbers_or_nan(text, fields):

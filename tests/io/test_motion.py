@@ -12,7 +12,7 @@ from sklearn_motionsync.io.motion import READERS
 
 import fuzz_readers
 from fuzz_readers import DAMAGES
-from motion_files import AMC, EXAMPLES, body, c3d, put, texts
+from motion_files import AMC, EXAMPLES, body, c3d, put, storage, texts, tracks, trc
 from plain_readers import PLAIN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -93,6 +93,37 @@ def test_damaged_files_are_read_or_refused(tmp_path, ending):
         for number in range(100)
     }
     assert outcomes == {"read", "ValueError"}
+
+
+@pytest.mark.parametrize(
+    ("name", "make", "place"),
+    [
+        ("a.c3d", c3d, "M1_z"),
+        ("a.trc", lambda x: trc(x, [*"ABC"]), "B_z"),
+        ("a.sto", lambda x: storage(x.reshape(len(x), -1), [*"abcdefghi"]), "f"),
+    ],
+)
+def test_numbers_of_no_recording_are_missing_with_a_warning(tmp_path, name, make, place):
+    positions = tracks()
+    positions[7, 1, 2] = 3e15
+    message = rf"a\.\w+: frame 7 of '{place}' is 3e\+15, the first of 1 number that become missing"
+    with pytest.warns(UserWarning, match="are missing"), pytest.warns(UserWarning, match=message):
+        found = read_motion(put(tmp_path, make(positions), name)).to_numpy()
+    hidden = positions.reshape(len(positions), -1) == 3e15
+    hidden[7, 3:6] |= name != "a.sto"
+    np.testing.assert_array_equal(np.isnan(found), hidden)
+    with pytest.raises(ValueError, match=r"a\.\w+: frame 0 of .* No recording has numbers beyond"):
+        read_motion(put(tmp_path, make(1e12 * positions), name))
+
+
+@pytest.mark.parametrize("ending", [".bvh", ".amc"])
+def test_joints_of_no_recording_are_refused(tmp_path, ending):
+    """Of a skeleton all joints are seen."""
+    for name, content in EXAMPLES[ending]().items():
+        content = content.replace(b"root 1 2 3", b"root 1 2 -2e9")
+        put(tmp_path, content.replace(b"OFFSET 0.5", b"OFFSET -2e7"), name)
+    with pytest.raises(ValueError, match=r"a\.\w+: frame 0 of '\w+' is .*e\+\d\d\. No recording"):
+        read_motion(tmp_path / f"a{ending}")
 
 
 # -- wrong calls ------------------------------------------------------------------------
