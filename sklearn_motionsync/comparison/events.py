@@ -60,7 +60,8 @@ def compare_events(
     groups : sequence of length n_sequences, default=None
         The subject of each trial. By default every trial is of another person.
     covariate : bool, default=False
-        Whether ``y`` are numbers: a regression.
+        Whether ``y`` are numbers: a regression on the means of people; or on slopes within them, if
+        ``y`` differs within people by a tenth of what it differs between them or more.
     paired : bool, default=False
         Whether every person has trials of both of two labels.
     unit : {"percent", "frames", "seconds"}, default="percent"

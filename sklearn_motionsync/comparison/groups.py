@@ -161,7 +161,8 @@ def compare_groups(
         The subject of each trial: the mean of a person's trials of one label is one unit. By
         default every trial is of another person.
     covariate : bool, default=False
-        Whether ``y`` are numbers: a regression.
+        Whether ``y`` are numbers: a regression on the means of people; or on slopes within them, if
+        ``y`` differs within people by a tenth of what it differs between them or more.
     paired : bool, default=False
         Whether every person has trials of both of two labels, such as before and after.
     signals : trials, default=None

@@ -91,6 +91,18 @@ def test_pairs_and_a_covariate():
     slope = stats.linregress(np.linspace(1, 2, 16), of_people()[:, 3]).slope
     assert found.loc["toe-off", "size"] == pytest.approx(slope)
     assert "with the covariate" in found.loc["toe-off", "direction"]
+    # What hardly differs within people is one of people; else slopes within them are tested.
+    up = np.where(second, 1, -1)
+    for off in (1e-12, 1e-7, 1e-4, 0.02):
+        nearly = compare_events(
+            GAIT.data, K, y=values + off * up, covariate=True, groups=GAIT.person
+        )
+        pd.testing.assert_frame_equal(nearly, found)
+    within = np.array(values) + np.where(np.repeat(range(16), 2), 0.2 * up, 1e-9 * up)
+    with pytest.warns(UserWarning, match=r"y differs by 0\.194 within people, and by 0\.307 betw"):
+        slopes = compare_events(GAIT.data, K, y=within, covariate=True, groups=GAIT.person)
+    # Of the first person there is no slope.
+    assert slopes.loc["toe-off", "size"] == pytest.approx(differences[1:, 3].mean() / 0.4)
 
 
 def test_events_that_some_trials_and_people_lack():
