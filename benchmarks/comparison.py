@@ -1,13 +1,16 @@
 """Whether `compare_groups` keeps its level, and what it finds, beside other tests of curves.
 
     pip install spm1d fdasrsf fdatools
-    python benchmarks/comparison.py DATA_FOLDER [level] [power] [peers] [nlreg1d] [--studies N]
+    python benchmarks/comparison.py DATA_FOLDER [level] [power] [covariate] [peers] [nlreg1d]
+        [--studies N]
 
 *Level*: studies in which nothing differs, of 8 to 30 people of `make_gait` with two strides, one to
 four signals, groups, pairs or a covariate drawn at random, and patterns of group A alone; and of
 people drawn from the forces of a muscle (nlreg1d), in groups at random. Signals are scaled for the
 match and compared in their units, by 199 permutations at 5 %. *Power*: differences that `make_gait`
 makes between 10 or 20 people of two strides, four signals, by 399 permutations. In per cent.
+*Covariate*: an event that moves by 2 % of the trial with a standard deviation of the covariate
+between 12 people, who vary by 2 %, their trials by 1 %; means of people, and slopes within them.
 
 *Peers*: null strides of 20 people, and what is made on top of them for group B: a warp of at most 2
 or 3 % of the cycle, around 20 % (early) or 70 % (late); a bump of the knee of 5 or 10 degrees; or
@@ -42,7 +45,7 @@ from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer
-from sklearn_motionsync.comparison import compare_groups
+from sklearn_motionsync.comparison import compare_events, compare_groups
 from sklearn_motionsync.datasets import make_gait
 
 P, KNEE, LEVEL, PERMUTATIONS = 101, 1, 0.05, 999
@@ -60,19 +63,19 @@ def compared(gait, kind, rng):
     """Arguments of `compare_groups`: what is compared."""
     persons = list(dict.fromkeys(gait.person))
     if kind == "two":
-        return {"groups": gait.group}
+        return {"y": gait.group}
     if kind == "three":
         of = dict(zip(persons, rng.permutation(np.arange(len(persons)) % 3).tolist(), strict=True))
-        return {"groups": [of[person] for person in gait.person]}
+        return {"y": [of[person] for person in gait.person]}
     if kind == "paired":
         flips = dict(zip(persons, rng.integers(2, size=len(persons)).tolist(), strict=True))
         second = [k % 2 for k in range(len(gait.person))]
         pairs = zip(second, gait.person, strict=True)
-        return {"groups": [k ^ flips[person] for k, person in pairs], "paired": True}
+        return {"y": [k ^ flips[person] for k, person in pairs], "paired": True}
     if kind == "within":
-        return {"covariate": rng.normal(size=len(gait.person))}
+        return {"y": rng.normal(size=len(gait.person)), "covariate": True}
     of = dict(zip(persons, rng.normal(size=len(persons)).tolist(), strict=True))
-    return {"covariate": [of[person] for person in gait.person]}
+    return {"y": [of[person] for person in gait.person], "covariate": True}
 
 
 def null_study(seed):
@@ -88,7 +91,7 @@ def null_study(seed):
     rows = []
     for kind in ("two", "three", "paired", "covariate", "within", "pattern of A"):
         design = compared(gait, "two" if kind == "pattern of A" else kind, rng)
-        design |= {"people": gait.person, "n_permutations": 199, "random_state": seed}
+        design |= {"groups": gait.person, "n_permutations": 199, "random_state": seed}
         found = compare_groups(one if kind == "pattern of A" else pipe, data, **design)
         rows.append(found.to_frame()["differs"].tolist())
     return rows
@@ -99,7 +102,7 @@ def power_study(seed, n_people, params):
     warnings.simplefilter("ignore")
     gait = make_gait(n_people, 2, random_state=seed, **params)
     pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(gait.data)
-    options = {"people": gait.person, "n_permutations": 399, "random_state": seed}
+    options = {"groups": gait.person, "n_permutations": 399, "random_state": seed}
     found = compare_groups(pipe, gait.data, gait.group, **options)
     return found.to_frame()["differs"].tolist()
 
@@ -112,10 +115,26 @@ def null_study_of_forces(seed, curves):
     X = list(curves[rng.permutation(len(curves))[:n], :, np.newaxis])
     sync, rows = DenseSynchronizer(P).fit(X), []
     three, age = (np.arange(n) % 3).tolist(), rng.normal(size=n)
-    for design in ({"groups": ["A", "B"] * (n // 2)}, {"groups": three}, {"covariate": age}):
+    for design in ({"y": ["A", "B"] * (n // 2)}, {"y": three}, {"y": age, "covariate": True}):
         found = compare_groups(sync, X, **design, n_permutations=199, random_state=seed)
         rows.append(found.to_frame()["differs"].tolist())
     return rows
+
+
+def covariate_study(seed, n_trials, spread, size):
+    """Whether a regression on means of 12 people finds an effect, and slopes within them."""
+    warnings.simplefilter("ignore")
+    rng, people = np.random.default_rng(seed), np.repeat(np.arange(12), n_trials)
+    of_people = rng.normal(size=12)[people]
+    y = of_people + spread * rng.normal(size=len(people))
+    events = 50 + size * y + 2 * rng.normal(size=12)[people] + rng.normal(size=len(people))
+    means = np.bincount(people, y)[people] / n_trials
+    given = {"groups": people, "covariate": True, "n_permutations": 399, "random_state": seed}
+    trials = [np.zeros((101, 1))] * len(people)
+    return [
+        compare_events(trials, events[:, np.newaxis], values, **given)["differs"].item()
+        for values in (means, y - means)
+    ]
 
 
 # -- beside others ----------------------------------------------------------------------
@@ -347,6 +366,18 @@ def power_table(folder, n_studies=300):
             print_row(f"{n_people}, {name}", [f"{x:.1f}" for x in shares])
 
 
+def covariate_table(folder, n_studies=300):
+    """How often an effect is found where a covariate differs between people and within them."""
+    print_head("trials a person, spread within people", ["means of people", "slopes within them"])
+    for n_trials in (2, 3, 5, 10):
+        for spread in (0.05, 0.1, 0.2, 0.5, 1):
+            work = (
+                delayed(covariate_study)(seed, n_trials, spread, 2) for seed in range(n_studies)
+            )
+            shares = 100 * np.mean(Parallel(2)(work), axis=0)
+            print_row(f"{n_trials}, {spread:g}", [f"{x:.0f}" for x in shares])
+
+
 def peer_table(folder, n_studies=30):
     columns = ["joint", "shape", "timing", "right", "overlap: shape", "timing"]
     for setting, signals in SETTINGS.items():
@@ -398,7 +429,7 @@ def nlreg1d_table(folder):
         paired = path.stem.startswith("Pataky")
         rejects, shape, timing = nlreg1d_test(*srsf(curves), n, LEVEL, paired=paired)
         words = f"shape {stretches(shape)}; timing {stretches(timing)}" if rejects else "nothing"
-        people = {"people": [*range(n)] * 2, "paired": True} if paired else {}
+        people = {"groups": [*range(n)] * 2, "paired": True} if paired else {}
         found = compare_groups(DenseSynchronizer(P).fit(X), X, groups, **people)
         print_row(path.stem, [PUBLISHED.get(path.stem, "nothing"), words, found.describe()])
 
@@ -406,14 +437,15 @@ def nlreg1d_table(folder):
 TABLES = {
     "level": level_table,
     "power": power_table,
+    "covariate": covariate_table,
     "peers": peer_table,
     "nlreg1d": nlreg1d_table,
 }
 
 
 def with_studies(options):
-    """Have the first three tables make so many studies."""
-    for name in [*TABLES][:3] if options.studies else ():
+    """Have all tables but the last make so many studies."""
+    for name in [*TABLES][:4] if options.studies else ():
         TABLES[name] = partial(TABLES[name], n_studies=options.studies)
 
 

@@ -39,9 +39,7 @@ _FEWEST = 4
 # Rounding of sums that are equal.
 _ROUNDING = 1e-9
 # A covariate that differs within people by less than this share of its spread between them is one
-# of people. Up to there a regression on means of people has the greater power, with two to ten
-# trials each: of 12 people at least 72 % where slopes within them have up to 35 %. And people in
-# whom it differs by less than this share of what is usual have no slope.
+# of people; and people in whom it differs by less than this share of what is usual have no slope.
 _OF_PEOPLE = 0.1
 # A value varies if its spread is more than this share of the largest of its feature.
 _VARIES = 1e-3
