@@ -148,12 +148,7 @@ def gait_events(
 def events_of(walk, known=None):
     """The events of a recording by time: label, side, and sample, with a fraction.
 
-    Parameters
-    ----------
-    walk : Walk
-    known : list of (str, str, float), default=None
-        Events that are known already, with rows, as from `Recordings.split_events`. By default
-        they are found.
+    Those that are known already, with rows, as from `Recordings.split_events`, are not found anew.
     """
     if known is None:
         return _find_events(walk)

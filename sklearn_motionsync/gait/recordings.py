@@ -200,18 +200,10 @@ _THIRD_DIFFERENCE, _SHARE, _DEVIATE = 20, 0.25, 0.3186
 
 
 def joints_of_feet(skeleton, feet=None):
-    """Indices of the joints at heels and toes; of those that are given, or guessed from the names.
+    """Indices of the joints at heels and toes: those that are given, or guessed from the names.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    feet : mapping of str to str, tuple of str or None, default=None
-        The joints of some or all of `_ENDS_OF_FEET`; None leaves one out.
-
-    Returns
-    -------
-    dict of str to tuple of int
-        Without those that are not known.
+    ``feet`` has the names of some or all of `_ENDS_OF_FEET`, and None leaves one out. The result, a
+    dict of tuples, lacks those that are not known.
     """
     named = {} if feet is None else dict(feet)
     for name, joints in named.items():

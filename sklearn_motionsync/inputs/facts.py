@@ -59,20 +59,9 @@ def facts_in_fit(estimator):
 def check_facts(estimator, facts, called, *, reset, which=None):
     """Hold the facts of trials against each other, and against those of the training set.
 
-    Parameters
-    ----------
-    estimator : estimator
-        Gets the facts of its training set. A parameter ``frame_rate`` of it counts as known.
-    facts, called : as for `compare_facts`
-    reset : bool
-        True in ``fit``.
-    which : sequence of str, default=None
-        The facts that matter; by default ``_facts`` of the estimator, or all.
-
-    Raises
-    ------
-    ValueError
-        As from `compare_facts`.
+    ``reset`` is True in ``fit``, where the estimator gets the facts of its training set. A
+    parameter ``frame_rate`` of it counts as known. The facts of ``which`` matter; by default those
+    of its ``_facts``, or all. All else is as for `compare_facts`.
     """
     which = getattr(estimator, "_facts", None) if which is None else which
     reference = {} if reset else facts_in_fit(estimator)

@@ -243,16 +243,9 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False, advi
 
 
 def check_magnitude(largest, what, *, training):
-    """Refuse trials in a unit in which no movement is measured.
+    """Refuse trials in a unit in which no movement is measured, by their largest absolute value.
 
-    Parameters
-    ----------
-    largest : float
-        The largest absolute value of all of them.
-    what : str
-        The trial that holds it, such as "Trial 3".
-    training : bool
-        Whether they are a whole training set: a smaller set may hold tiny values only.
+    ``what`` is the trial that holds it. A set that is no whole training set may hold tiny values.
     """
     if largest > LARGEST or (training and 0 < largest < SMALLEST):
         raise ValueError(
@@ -273,12 +266,7 @@ def column_names(x):
 def check_names(x, expected, what):
     """Refuse a table whose columns have other names, or another order, than expected.
 
-    Parameters
-    ----------
-    x : table, or an array-like without names, which passes
-    expected : array-like or None
-        None: no names are known.
-    what : str
+    A table without names passes, as does any table where no names are expected.
     """
     names = column_names(x)
     if names is None or expected is None or names == list(expected):

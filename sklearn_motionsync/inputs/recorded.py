@@ -56,18 +56,10 @@ _FEW_GAPS, _SHARE_OF_GAPS = 3, 0.05
 
 
 def recorded_frames(df):
-    """The frames of the recording that the rows of a table are.
+    """The frames of the recording that the rows of a trial are, in the order of the rows.
 
-    Parameters
-    ----------
-    df : DataFrame
-        One trial. Frames are counted as in its ``attrs["events"]``: from 0, the first row
-        of the table that ``attrs`` describe.
-
-    Returns
-    -------
-    ndarray of int, shape (n_rows,), or None
-        In the order of the rows. None if the index does not tell.
+    They are counted as in its ``attrs["events"]``: from 0, the first row of the table that
+    ``attrs`` describe. The result is None if the index does not tell.
     """
     index, clock = _frame_level(df), df.attrs.get(CLOCK)
     if isinstance(index, pd.RangeIndex) and not names_seconds(index.name):
@@ -91,17 +83,7 @@ def recorded_frames(df):
 
 
 def frames_of_rows(x):
-    """The frames of the rows of a trial, which increase; without an index of frames, from 0.
-
-    Parameters
-    ----------
-    x : DataFrame, or array of frames
-        One trial.
-
-    Returns
-    -------
-    ndarray of int, shape (n_rows,)
-    """
+    """The frames of the rows of a trial, which increase; without an index of frames, from 0."""
     frames = recorded_frames(x) if isinstance(x, pd.DataFrame) else None
     if frames is None or (np.diff(frames) <= 0).any():
         return np.arange(len(x))
@@ -111,17 +93,9 @@ def frames_of_rows(x):
 def frame_rate_of_rows(x):
     """The frame rate that the rows of a table have now: 60 of every second one of 120.
 
-    Parameters
-    ----------
-    x : DataFrame, or anything
-        One trial.
-
-    Returns
-    -------
-    float or None
-        Frames a second, by ``attrs["frame_rate"]`` and which frames the rows are, or by an index
-        in seconds: dates, durations, or numbers under such a name. None if it is not known or rows
-        are not evenly spaced, and for all that is no DataFrame.
+    By ``attrs["frame_rate"]`` and which frames the rows are, or by an index in seconds: dates,
+    durations, or numbers under such a name. None if it is not known or rows are not evenly spaced,
+    and for all that is no DataFrame.
     """
     if not isinstance(x, pd.DataFrame):
         return None
@@ -152,17 +126,7 @@ def frame_rates_of(sequences, frame_rate, called):
 
 
 def start_of_rows(x):
-    """The time of the first row of a table in seconds, by its index or ``attrs``; 0 if unknown.
-
-    Parameters
-    ----------
-    x : DataFrame, or anything
-        One trial.
-
-    Returns
-    -------
-    float
-    """
+    """The time of the first row of a table in seconds, by its index or ``attrs``; 0 if unknown."""
     if not isinstance(x, pd.DataFrame) or not len(x):
         return 0.0
     if _rate_of_seconds(_frame_level(x)) is not None:
@@ -213,15 +177,9 @@ def warn_of_rows(sequences, called):
     """Warn of the first table whose index says that its rows are not even steps of time.
 
     Every k-th row is a lower frame rate and passes. Random rows, as of folds of a table, do not;
-    nor do, where the index tells the time, rows with a gap.
-    Or that they have a frame rate of which the one in ``attrs`` is no multiple: rows may have been
-    left out since.
-
-    Parameters
-    ----------
-    sequences : list of DataFrame and of others, which pass
-    called : callable
-        Gives the name of a trial by its index.
+    nor do, where the index tells the time, rows with a gap. Or that they have a frame rate of which
+    the one in ``attrs`` is no multiple: rows may have been left out since. What is no table passes,
+    and ``called`` gives the name of a trial by its index.
     """
     for i, x in enumerate(sequences):
         trouble = _trouble_of_rows(x) if isinstance(x, pd.DataFrame) else None
@@ -324,21 +282,10 @@ class Recorded:
         self._rate = frame_rate_of_rows(df)
 
     def attrs_of(self, rows, times=None, grid=None):
-        """The ``attrs`` of some rows, clock and events moved to the frames of a trial.
+        """The ``attrs`` of a trial of some rows, clock and events moved to its frames.
 
-        Parameters
-        ----------
-        rows : ndarray of int
-            Which rows of the table are in the trial, in its order.
-        times : ndarray, default=None
-            Of these rows, in any unit.
-        grid : ndarray, default=None
-            The even times that replace them.
-
-        Returns
-        -------
-        dict
-            Without those that are not known, as the index does not tell which frames rows are.
+        ``times`` are those of the rows, in any unit, and ``grid`` the even ones that replace them.
+        What the index does not tell is left out.
         """
         facts = {key: value for key, value in self._attrs.items() if key not in _OF_ROWS}
         rate = facts.get("frame_rate")

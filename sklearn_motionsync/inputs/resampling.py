@@ -36,17 +36,9 @@ _MOST = 100
 
 
 def times_as_numbers(values, what):
-    """Times as numbers: dates are seconds from the first of them, durations are seconds.
+    """Times, called ``what`` in messages, as numbers (n_frames,).
 
-    Parameters
-    ----------
-    values : Series or Index
-    what : str
-        Their name in messages.
-
-    Returns
-    -------
-    ndarray of float64, shape (n_frames,)
+    Dates are seconds from the first of them, and durations are seconds.
     """
     series = pd.Series(values).infer_objects()
     if isinstance(series.dtype, pd.PeriodDtype):
@@ -77,17 +69,10 @@ def find_time_gaps(times, max_gap_time=None):
 
 
 def even_grid(times, frame_rate, what):
-    """The even times that replace those of a trial; None if they are even themselves.
+    """The even times that replace those of a trial, which increase; None if they are even.
 
-    Parameters
-    ----------
-    times : ndarray, shape (n_frames,)
-        They increase.
-    frame_rate : float or None
-        Frames in a unit of time; by default as near to the median step as it takes to keep the
-        first and the last frame.
-    what : str
-        The name of the trial in messages.
+    Without a ``frame_rate``, in a unit of time, their step is as near to the median step as it
+    takes to keep the first and the last frame. ``what`` is the name of the trial in messages.
     """
     if len(times) < 2:
         return None

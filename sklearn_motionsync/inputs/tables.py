@@ -156,15 +156,8 @@ def own_label(x):
 def label_of_part(whole, part, level, levels=()):
     """The label of a part of a recording, behind that of the recording, as ``attrs``.
 
-    Parameters
-    ----------
-    whole : hashable
-        What the recording is called; a tuple has several levels.
-    part : hashable
-    level : str
-        What the level of parts is called, unless the recording has one of that name.
-    levels : sequence of str, default=()
-        Names of the levels of the recording, with that of the frames, if it has any.
+    A recording with several levels is called by a tuple, and ``levels`` are their names and that of
+    the frames. The level of parts is called ``level``, unless the recording has one of that name.
     """
     before = whole if isinstance(whole, tuple) else (whole,)
     names = tuple(levels)[:-1]

@@ -16,19 +16,9 @@ _OTHERS = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}
 def split_channels(channels):
     """Columns that move joints, and columns that turn them.
 
-    Parameters
-    ----------
-    channels : list of list of (str, str)
-        For each joint its channels in the order of their columns: ("t" or "r", axis), with the
-        axis "X", "Y" or "Z".
-
-    Returns
-    -------
-    moving : ndarray (3, n)
-        Axis, joint and column of each translation.
-    turning : dict of str to list of (int, list of int)
-        For each sequence of axes, such as "ZXY", the joints that turn about it, each with its
-        columns.
+    Of each joint come its channels in the order of their columns: ("t" or "r", axis), with the axis
+    "X", "Y" or "Z". ``moving`` (3, n) has axis, joint and column of each translation, ``turning``
+    for each sequence of axes, such as "ZXY", the joints that turn about it, each with its columns.
     """
     moving, turning, column = [], {}, 0
     for j, joint_channels in enumerate(channels):

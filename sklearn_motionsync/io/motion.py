@@ -311,37 +311,16 @@ def check_frame_rate(frame_rate):
 def describe_times(
     name, times, *, stated=None, decimals=17, frame_rate=None, unit="s", may_be_thinned=False
 ):
-    """The ``attrs`` of a recording that describe its times.
+    """The ``attrs`` of a recording that describe its times, which do not decrease.
 
-    Parameters
-    ----------
-    name : str
-        Name of the recording, for the warning.
-    times : ndarray (n_frames,)
-        The times of the frames, not decreasing.
-    stated : float or None
-        The frame rate that the file states. It counts where the times agree with it, as far as
-        their digits allow.
-    decimals : int
-        How many decimals the times were written with.
-    frame_rate : float or None
-        The frame rate that the caller of the reader gives. It replaces all others.
-    unit : {"s", "frames"}
-        Unit of the times. Those in frames give no frame rate.
-    may_be_thinned : bool
-        Whether every second or k-th frame of the stated rate is no contradiction.
+    ``frame_rate`` (None if it is not known), ``first_time`` where times are in seconds, ``times``
+    where they are uneven. A rate that the file states counts where the times agree with it, as far
+    as the ``decimals`` that they were written with allow. A ``frame_rate`` of the caller replaces
+    all others. Times in frames give no frame rate. With ``may_be_thinned`` every k-th frame of the
+    stated rate is no contradiction.
 
-    Returns
-    -------
-    dict
-        ``frame_rate`` (None if it is not known), ``first_time`` where times are in seconds,
-        ``times`` where they are uneven.
-
-    Warns
-    -----
-    UserWarning
-        In the caller's caller: if times are uneven, or contradict the stated rate, and no
-        `frame_rate` is given.
+    Warns, in the caller's caller, if times are uneven or contradict the stated rate, and no
+    ``frame_rate`` is given.
     """
     rate, even = _estimate_frame_rate(times, decimals, stated)
     facts = {"frame_rate": rate if unit == "s" else None}

@@ -345,17 +345,7 @@ def add_middles(joints, parents, points):
 
     So are hips that were moved from the pelvis by one height, whatever way it turns. The middle,
     ``<parent>_middle``, keeps its distance from the parent, and both joints that from the middle.
-
-    Parameters
-    ----------
-    joints : list of str
-    parents : list of int
-    points : ndarray, shape (n_frames, n_joints, 3)
-
-    Returns
-    -------
-    joints, parents, points :
-        The same with more joints at the end.
+    Points are (n_frames, n_joints, 3); more joints stand at the end.
     """
     joints, parents = list(joints), list(parents)
 
