@@ -113,7 +113,7 @@ class LagDisplay(Display):
         reached = route_to_synchronizer(
             estimator, X, params, caller, kind=PartSynchronizer, uses=()
         )
-        rates = reached.facts.frame_rates
+        rates = reached.facts.frame_rates if reached.facts.are_timed else None
         lags = reached.synchronizer.lags(reached.trials, groups, unit=unit, frame_rate=rates)
         return cls(lags, xlabel=xlabel).plot(ax)
 

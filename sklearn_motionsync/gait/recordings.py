@@ -12,8 +12,9 @@ from ..body.landmarks import as_tuple, guess_feet
 from ..body.skeleton import Skeleton, check_columns
 from ..inputs.collections import as_collection, check_members
 from ..inputs.numbers import nanmean
-from ..inputs.recorded import frame_rates_of, frames_of_rows, start_of_rows
-from ..inputs.tables import as_pandas, index_of, labels_of
+from ..inputs.recorded import frames_of_rows, start_of_rows
+from ..inputs.tables import as_pandas, index_of
+from ..inputs.trial_facts import TrialFacts
 from ..inputs.wording import counted, within
 from ..matching.counting import runs_of, whole
 from ..matching.filters import smooth
@@ -71,11 +72,12 @@ class Recordings:
         self.skeleton, self._feet = skeleton, joints_of_feet(skeleton, feet)
         names = list(first.columns) if isinstance(first, pd.DataFrame) else []
         check_columns(names, skeleton, self.called(0), self._checked[0].shape[1])
-        self._labels, levels = labels_of(self._given)
-        self.levels = list(levels[:-1])
-        self._rates = self._find_rates(frame_rate)
-        facts = self._checked.facts or [{}] * len(self._checked)
-        self._units = [known.get("units") for known in facts]
+        facts = TrialFacts.of(self._given, frame_rate)
+        self._labels, self.levels = facts.labels, list(facts.levels[:-1])
+        self._rates = facts.known_rates().tolist()
+        self._check_rates()
+        of_each = self._checked.facts or [{}] * len(self._checked)
+        self._units = [known.get("units") for known in of_each]
 
     def __len__(self):
         return len(self._checked)
@@ -170,17 +172,15 @@ class Recordings:
         labels = keys.to_frame(index=False)
         return pd.concat([labels, pd.concat(tables, ignore_index=True)], axis=1)
 
-    def _find_rates(self, frame_rate):
-        rates = frame_rates_of(self._given, frame_rate, self.called)
+    def _check_rates(self):
         slowest, fastest = _RATES
-        for i, rate in enumerate(rates):
+        for i, rate in enumerate(self._rates):
             if not slowest <= rate <= fastest:
                 raise ValueError(
                     f"{self.called(i)} has a frame rate of {rate:g}; recordings of people have "
                     f"{slowest:g} to {fastest:g} frames a second. Give frame_rate= in frames a "
                     "second, not the time between frames."
                 )
-        return rates
 
 
 # -- the feet of a recording, heels and toes beside the pelvis ----------------------------------

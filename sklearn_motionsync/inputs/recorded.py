@@ -12,16 +12,14 @@ from numbers import Real
 import numpy as np
 import pandas as pd
 
-from .resampling import as_frame_rates, is_even, is_rate, rounded_rate, times_as_numbers
+from .resampling import is_even, is_rate, rounded_rate, times_as_numbers
 from .tables import FRAME, split_table
-from .wording import within
 
 __all__ = [
     "CLOCK",
     "SAME_RATE",
     "Recorded",
     "frame_rate_of_rows",
-    "frame_rates_of",
     "frames_of_rows",
     "is_thinned",
     "names_seconds",
@@ -106,23 +104,6 @@ def frame_rate_of_rows(x):
     if len(steps) and (steps[0] == 0 or (steps != steps[0]).any()):
         return None
     return float(rate / steps[0]) if len(steps) else float(rate)
-
-
-def frame_rates_of(sequences, frame_rate, called):
-    """The frame rate of each trial, a list: as it is given, or else as tables tell it.
-
-    ``called`` gives the name of a trial by its index.
-    """
-    if frame_rate is not None:
-        n = len(sequences)
-        return np.broadcast_to(as_frame_rates(frame_rate, n), (n, 1))[:, 0].tolist()
-    rates = [frame_rate_of_rows(x) for x in sequences]
-    if None in rates:
-        raise ValueError(
-            f"The frame rate of {within(called(rates.index(None)))} is not known: give "
-            "frame_rate=, or tables whose attrs or index tell it."
-        )
-    return rates
 
 
 def start_of_rows(x):

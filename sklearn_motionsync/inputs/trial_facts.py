@@ -12,8 +12,8 @@ from .collections import NOT_ONE, Trials, as_collection, as_source
 from .numbers import as_numbers
 from .recorded import frame_rate_of_rows
 from .resampling import as_frame_rates
-from .tables import INDEX_NAMES, index_of, labels_given, labels_of
-from .wording import counted
+from .tables import INDEX_NAMES, index_of, labels_given, labels_of, name_trial
+from .wording import counted, within
 
 __all__ = ["TrialFacts"]
 
@@ -25,8 +25,8 @@ class TrialFacts(NamedTuple):
     ----------
     lengths : ndarray of float, shape (n_sequences,)
         How many frames each has as recorded.
-    frame_rates : ndarray, shape (n_sequences,), or None
-        Frames a second: as they were given, or else as tables tell them. None if one is not known.
+    frame_rates : ndarray, shape (n_sequences,)
+        Frames a second: as they were given, or else as tables tell them; NaN where not known.
     labels : list
         Of the trials: those of tables, or their numbers.
     levels : tuple of str
@@ -34,7 +34,7 @@ class TrialFacts(NamedTuple):
     """
 
     lengths: np.ndarray
-    frame_rates: np.ndarray | None
+    frame_rates: np.ndarray
     labels: list
     levels: tuple
 
@@ -92,8 +92,8 @@ class TrialFacts(NamedTuple):
                 f"Trial {i} has {counted(lengths[i], 'frame')}; give the trials, or "
                 "how many frames each has, whole numbers of at least 2."
             )
-        is_known = len(rates) == len(lengths) and None not in rates
-        facts = cls(lengths, np.array(rates) if is_known else None, labels, levels)
+        rates = np.array(rates if len(rates) == len(lengths) else [None] * len(lengths))
+        facts = cls(lengths, rates.astype(np.float64), labels, levels)
         return facts if frame_rate is None else facts.at(frame_rate)
 
     @classmethod
@@ -103,8 +103,7 @@ class TrialFacts(NamedTuple):
         labels, levels = [label for each in labels for label in each], set(levels)
         if len(levels) > 1 or len(set(labels)) < len(labels):
             labels, levels = list(range(len(labels))), {INDEX_NAMES}
-        rates = None if any(each is None for each in rates) else np.concatenate(rates)
-        return cls(np.concatenate(lengths), rates, labels, levels.pop())
+        return cls(np.concatenate(lengths), np.concatenate(rates), labels, levels.pop())
 
     def label(self, trials):
         """Checked trials, called as they were when they were recorded."""
@@ -117,13 +116,18 @@ class TrialFacts(NamedTuple):
         rates = np.broadcast_to(as_frame_rates(frame_rate, n), (n, 1))[:, 0]
         return self._replace(frame_rates=rates)
 
+    @property
+    def are_timed(self):
+        """Whether the frame rates of all are known."""
+        return not np.isnan(self.frame_rates).any()
+
     def known_rates(self):
-        """The frame rates; an error if they are not known."""
-        if self.frame_rates is None:
+        """The frame rates; an error if one is not known."""
+        if not self.are_timed:
+            i = int(np.isnan(self.frame_rates).argmax())
             raise ValueError(
-                "Time in seconds needs frame_rate, frames a second of the trials, which they do "
-                "not tell: give frame_rate=..., or tables with an index in seconds or "
-                "attrs['frame_rate']."
+                f"The frame rate of {within(name_trial(i, self.labels[i]))} is not known: give "
+                "frame_rate=, or tables whose attrs or index tell it."
             )
         return self.frame_rates
 

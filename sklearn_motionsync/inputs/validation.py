@@ -13,7 +13,7 @@ from sklearn.utils import get_tags
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .collections import ACCEPTED, NOT_ONE, Trials, as_collection, as_source, check_members
+from .collections import ACCEPTED, NOT_ONE, Trials, as_collection, check_members
 from .facts import check_facts, facts_of
 from .numbers import (
     FLOATS,
@@ -24,7 +24,7 @@ from .numbers import (
     column_names,
     refuse_non_numeric,
 )
-from .tables import FRAME, SPLIT, TRIAL, as_pandas, labels_of, stack_frame
+from .tables import FRAME, SPLIT, TRIAL, as_pandas, stack_frame
 from .types import Transformed, TrialsLike
 from .wording import counted
 
@@ -33,7 +33,6 @@ __all__ = [
     "TrialTransformerMixin",
     "check_transformed",
     "check_trials",
-    "labels_of_input",
     "names_of_input",
     "read_collection",
     "read_source",
@@ -273,24 +272,6 @@ def restore(estimator, trials, arrays, *, frames=None, columns=None):
     if trials.kind == "array" or isinstance(arrays, np.ndarray):
         return np.stack(arrays) if isinstance(arrays, list) else arrays
     return arrays
-
-
-def labels_of_input(X, reached):
-    """Labels and level names of the input of a pipeline.
-
-    Parameters
-    ----------
-    X : trials, the input of the first step of a pipeline
-    reached : Trials
-        The input of a later step, maybe without labels.
-    """
-    is_read = isinstance(X, Trials) or as_source(X) is not None
-    sequences = None if is_read else as_collection(X)
-    if sequences is not None:
-        labels, levels = labels_of(sequences)
-        if labels != list(range(len(labels))) and len(labels) == len(reached):
-            return labels, levels
-    return reached.labels, reached.levels
 
 
 def read_collection(X):

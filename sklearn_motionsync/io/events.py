@@ -15,7 +15,6 @@ from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import (
     Recorded,
-    frame_rates_of,
     frames_of_rows,
     names_seconds,
     refuse_moved_events,
@@ -30,6 +29,7 @@ from ..inputs.tables import (
     labels_of,
     name_trial,
 )
+from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import Table, TrialsLike, ValuesLike
 from ..matching.counting import whole
 
@@ -399,7 +399,7 @@ def keyframes_from_events(
     else:
         listed, in_seconds = _events_in(events, labels, levels[:-1])
     if in_seconds or frame_rate is not None:
-        rates = frame_rates_of(sequences, frame_rate, trials.__getitem__)
+        rates = TrialFacts.of(sequences, frame_rate).known_rates()
     clocks = [frames_of_rows(x) for x in sequences]
     if in_seconds:
         clocks = [

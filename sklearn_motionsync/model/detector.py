@@ -16,9 +16,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..body.limbs import PARTS, names_of_cosines
 from ..body.mirror import exchange_of_sides
-from ..inputs.tables import index_of
 from ..inputs.types import Labels, TrialsLike
-from ..inputs.validation import labels_of_input
 from ..matching.counting import first_largest
 from ..matching.gaps import fill_with_mean, is_gappy
 from ..utils.doc_links import DocumentedMixin
@@ -276,12 +274,11 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         Parameters
         ----------
         X : trials
-            As the pipeline takes them.
-        reference : trials, as the pipeline takes them, default=None
-            Good ones of the person that X is of, two to five. It needs training groups with several
-            trials.
+            As for ``predict``.
+        reference : trials, default=None
+            As for ``predict``.
         **params : dict
-            What steps take besides in ``transform``, such as ``keyframes``.
+            As for ``predict``.
 
         Returns
         -------
@@ -298,12 +295,11 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         Parameters
         ----------
         X : trials
-            As the pipeline takes them.
-        reference : trials, as the pipeline takes them, default=None
-            Good ones of the person that X is of, two to five. It needs training groups with several
-            trials.
+            As for ``predict``.
+        reference : trials, default=None
+            As for ``predict``.
         **params : dict
-            What steps take besides in ``transform``, such as ``keyframes``.
+            As for ``predict``.
 
         Returns
         -------
@@ -320,12 +316,11 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         Parameters
         ----------
         X : trials
-            As the pipeline takes them.
-        reference : trials, as the pipeline takes them, default=None
-            Good ones of the person that X is of, two to five. It needs training groups with several
-            trials.
+            As for ``predict``.
+        reference : trials, default=None
+            As for ``predict``.
         **params : dict
-            What steps take besides in ``transform``, such as ``keyframes``.
+            As for ``predict``.
 
         Returns
         -------
@@ -336,9 +331,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             those that are too short or too weak. ``score``: up to 1 is accepted. ``reason`` of a
             rejection, such as "too long, too weak"; empty if the trial is accepted.
         """
-        scores, trials, statistics, tails, acceptance = self._test(X, reference, params, "report")
-        labels, levels = labels_of_input(X, trials)
-        table = pd.DataFrame(statistics, index=index_of(labels, levels[:-1]))
+        scores, facts, statistics, tails, acceptance = self._test(X, reference, params, "report")
+        table = pd.DataFrame(statistics, index=facts.index)
         table["score"] = scores
         # What no test alone explains is that which adds most to the score.
         names, shares = list(tails), acceptance.shares(tails)
@@ -433,7 +427,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         }
 
     def _test(self, X, reference, params, method):
-        """Scores of trials, and the trials and what their reasons are found in."""
+        """Scores of trials, their facts, and what their reasons are found in."""
         check_is_fitted(self)
         tests, caller = self._tests, f"ActionDetector.{method}"
         try:
@@ -490,7 +484,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             # More like the image than like the action.
             far = np.maximum(far, statistics[name])
         scores = np.where(far > 1, np.maximum(scores, far), scores)
-        return scores, trials, statistics, tails, acceptance
+        return scores, curves.facts, statistics, tails, acceptance
 
 
 def _check_steps(pipeline):

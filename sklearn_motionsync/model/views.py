@@ -13,7 +13,7 @@ from ..body.limbs import LIMB_NAMES, limb_indices, unit_vectors
 from ..inputs.collections import Trials, as_collection
 from ..inputs.features import as_features, names_of_features
 from ..inputs.trial_facts import TrialFacts
-from ..inputs.validation import check_trials, labels_of_input
+from ..inputs.validation import check_trials
 from ..matching.counting import first_largest
 from ..synchronizers.match import Match
 from ..transformers.aspace import ASpace
@@ -480,7 +480,7 @@ def models_of_classes(estimator, X, params, caller, only=None):
     if only is not None:
         chosen = chosen[[only(len(trials))]]
     columns = first_largest(classifier.predict_proba(trials.take(chosen)), axis=1)
-    collection, all_labels = as_collection(X), labels_of_input(X, trials)[0]
+    collection, all_labels = as_collection(X), TrialFacts.of(X, checked=trials).labels
     steps, models = [] if before is None else before.steps, []
     for column in dict.fromkeys(columns.tolist()):
         indices, label = chosen[columns == column], classifier.classes_[column]

@@ -147,7 +147,7 @@ def write_player(
     times = None if match is None else match.times
     facts_of, marks = TrialFacts.of if match is None else match.facts_of, []
     facts = facts_of(trials, frame_rate)
-    seconds = None if facts.frame_rates is None else facts.durations()
+    seconds = facts.durations() if facts.are_timed else None
     if keyframes is not None:
         rows = Keyframes(keyframes, n, frame_rate, anywhere=True)
         shares = rows.shares(Trials([points for points, _, _ in bodies], "list", facts.labels))

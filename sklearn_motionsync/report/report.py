@@ -378,7 +378,7 @@ class TrialSet(NamedTuple):
             pd.DataFrame(design, index=range(n)),
             of_groups,
             facts.lengths.astype(int),
-            None if facts.frame_rates is None else facts.durations(),
+            facts.durations() if facts.are_timed else None,
             labels_of_signals(aligned.names, units),
         )
 

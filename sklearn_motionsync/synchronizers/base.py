@@ -542,12 +542,8 @@ class AnchoredSynchronizer(Synchronizer):
             Trials; the rows of a 2-D array are univariate ones.
         y : ignored
             Present for API consistency.
-        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each trial, as for ``fit``.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            As for ``fit``.
-        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
-            As for ``fit``.
+        keyframes, frame_rate, confidence : default=None
+            Of these trials, as for ``fit``.
 
         Returns
         -------
@@ -573,12 +569,8 @@ class AnchoredSynchronizer(Synchronizer):
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Trials. Memory maps, and collections that give trials by index, are read in
             parts, once each, if no key-frames are given; rows of a matrix are loaded into memory.
-        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each trial, as for ``fit``.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            As for ``fit``.
-        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
-            As for ``fit``.
+        keyframes, frame_rate, confidence : default=None
+            Of these trials, as for ``fit``.
         fill : {None, "model"}, default=None
             What becomes of NaN, which is what was hidden. None: it stays NaN, feature by feature.
             "model": it is filled from the mean of the warped training set (``examples_``) at the
@@ -606,12 +598,8 @@ class AnchoredSynchronizer(Synchronizer):
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Trials; the rows of a 2-D array are univariate ones. Read in parts as by ``transform``.
-        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each trial, as for ``fit``.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            As for ``fit``.
-        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
-            As for ``fit``.
+        keyframes, frame_rate, confidence : default=None
+            Of these trials, as for ``fit``.
 
         Returns
         -------

@@ -525,9 +525,8 @@ class Match:
         if X is not None:
             facts = TrialFacts.of(X, frame_rate)
             self._check_count(facts.lengths, "length")
-            known = self.facts
-            if facts.frame_rates is None and known is not None and known.frame_rates is not None:
-                facts = facts.at((facts.lengths - 1) / known.durations())
+            if not facts.are_timed and self.facts is not None and self.facts.are_timed:
+                facts = facts.at((facts.lengths - 1) / self.facts.durations())
             return facts
         if self.facts is None:
             raise ValueError(

@@ -209,10 +209,8 @@ class PartSynchronizer(AnchoredSynchronizer):
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Trials; the rows of a 2-D array are univariate ones.
-        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of each trial, as for ``fit``.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            As for ``fit``.
+        keyframes, frame_rate : default=None
+            Of these trials, as for ``fit``.
 
         Returns
         -------

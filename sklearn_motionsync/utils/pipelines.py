@@ -202,7 +202,7 @@ def _of_match(match, X, params, caller, kind):
             f"{caller} got a Match of {len(match.times)} trials, and X are others: "
             f"{len(facts.lengths)}, or of other lengths. Give the X that were matched."
         )
-    if facts.frame_rates is None:
+    if not facts.are_timed:
         facts = facts._replace(frame_rates=match.facts.frame_rates)
     known = match.of_trials(facts, reached)
     return reached._replace(facts=facts, caller=caller, known=known)

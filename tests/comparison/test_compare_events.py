@@ -132,7 +132,7 @@ def test_events_that_some_trials_and_people_lack():
         ({"events": np.ones((3, 2))}, "events must be a list of 32 arrays"),
         ({"events": K.iloc[:, ::-1]}, "key-frames must be 5 increasing frames"),
         ({"unit": "hours"}, "unit must be one of"),
-        ({"unit": "seconds"}, "Time in seconds needs frame_rate"),
+        ({"unit": "seconds"}, "The frame rate of trial 0 is not known"),
         ({"level": 0}, "level must be a number"),
         ({"n_permutations": 18}, "whole number of at least 19"),
         ({"y": [0, 1] * 16, "paired": True, "events": K[K.index % 4 % 3 > 0].reindex(K.index)},

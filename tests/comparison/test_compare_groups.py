@@ -666,7 +666,7 @@ GROUPS = ["a", "b"] * 8
             for n in (18, 19.5, True)
         ),
         ({"y": GROUPS, "unit": "hours"}, "unit must be one of"),
-        ({"y": GROUPS, "unit": "seconds"}, "Time in seconds needs frame_rate"),
+        ({"y": GROUPS, "unit": "seconds"}, "The frame rate of trial 0 is not known"),
         ({"y": GROUPS, "signals": [np.ones((5, 1))] * 3}, "one sequence for each of 16 trials"),
         ({"y": GROUPS, "signals": [np.full((5, 1), np.nan)] * 16}, "Trial 0, frame"),
         ({"y": GROUPS, "features": "knee"}, "knee"),

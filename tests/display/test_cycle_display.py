@@ -58,7 +58,7 @@ def test_from_estimator_refuses(segmenter):
         ({"take": 2}, "take must be from 0 to 1, got"),
         ({"feature": "knee"}, "no feature 'knee'"),
         ({"unit": "hours"}, "unit must be one of"),
-        ({"unit": "seconds"}, "needs frame_rate"),
+        ({"unit": "seconds"}, "The frame rate of .* is not known"),
     ):
         with pytest.raises(ValueError, match=message):
             CycleDisplay.from_estimator(segmenter, GAIT.data, **change)

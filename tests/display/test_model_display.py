@@ -147,7 +147,7 @@ def test_model_without_a_pipeline(bunch, pipe):
         ({"band": ["mean"]}, ValueError, "band must be one of"),
         ({"keyframes": [[3]], "X": None}, TypeError, "takes keyframes along with trials X"),
         ({"unit": "ms"}, ValueError, "unit must be one of .*got 'ms'"),
-        ({"unit": "seconds"}, ValueError, "needs frame_rate"),
+        ({"unit": "seconds"}, ValueError, "The frame rate of .* is not known"),
         ({"unit": "seconds", "frame_rate": 0}, ValueError, "frame_rate must be one number above"),
         ({"unit": "seconds", "frame_rate": [1, 2]}, ValueError, r"each of the 9 .* got \[1, 2\]"),
     ],

@@ -108,7 +108,7 @@ def test_units(fitted, bending_aspace):
     last = np.array([len(x) - 1 for x in X])[:, np.newaxis] / 50.0
     for got, wanted in zip(match.interval(0.9, "seconds", X, 50.0), frames, strict=True):
         np.testing.assert_allclose(got, wanted / (P - 1) * last)
-    with pytest.raises(ValueError, match="Time in seconds needs frame_rate"):
+    with pytest.raises(ValueError, match="The frame rate of trial 0 is not known"):
         match.interval(0.9, "seconds")
     found = match.offsets_in("seconds", X, 50.0, coverage=0.9)
     for got, wanted in zip(found, (match.times, *frames), strict=True):
