@@ -30,7 +30,7 @@ from sklearn_motionsync import (
     to_frame,
     to_trials,
 )
-from sklearn_motionsync.comparison import compare_events, compare_groups, compare_to_norm
+from sklearn_motionsync.comparison import compare_groups, compare_to_norm
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.live import OnlineSynchronizer
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
@@ -419,25 +419,6 @@ def test_a_table_in_another_order_is_refused(method, sync):
     )
     with pytest.raises(ValueError, match=r"rows of keyframes are labelled .* in another order"):
         getattr(sync, method)(GAIT.data, keyframes=table.sort_values(0, ascending=False))
-
-
-@pytest.mark.parametrize("frame_rate", [True, -1, 0, np.nan, np.inf, "x", [100.0, -1.0]])
-def test_a_wrong_frame_rate_is_refused_where_it_does_not_matter(frame_rate, sync):
-    match = sync.match(GAIT.data)
-    for call in (
-        lambda: sync.match(GAIT.data, frame_rate=frame_rate),
-        lambda: DenseSynchronizer(51).fit(GAIT.data, frame_rate=frame_rate),
-        lambda: match.offsets_in("percent", frame_rate=frame_rate),
-        lambda: compare_groups(sync, GAIT.data, GAIT.group, frame_rate=frame_rate),
-        lambda: compare_events(GAIT.data, GAIT.keyframes, unit="percent", frame_rate=frame_rate),
-        lambda: display.SynchronizationDisplay.from_estimator(
-            sync, GAIT.data, frame_rate=frame_rate
-        ),
-    ):
-        with pytest.raises(
-            ValueError, match=r"frame_rate (must be one number above 0|is not a numeric)"
-        ):
-            call()
 
 
 def test_a_keyframe_that_only_late_trials_know():
