@@ -367,9 +367,13 @@ def test_keyframes_and_features(tmp_path, monkeypatch):
     page = Text(write_report(tmp_path / "a.html", sync, GAIT.data, **given))
     assert "The figure shows 4 of 7 signals." in page.text
     assert page.rows("Standard deviation between trials")[-1] == ["x6", "0", "0", ""]
-    page = Text(write_report(tmp_path / "a.html", sync, GAIT.data, **given, features=range(6)))
-    assert "The figure shows" not in page.text
-    assert [len(figure.axes) for figure in figures[2::2]] == [8, 12]
+    # All seven are shown if they are named, and so are six.
+    given["features"] = range(7)
+    named = Text(write_report(tmp_path / "a.html", sync, GAIT.data, **given))
+    given |= {"features": None, "signals": [x[:, :6] for x in wide]}
+    six = Text(write_report(tmp_path / "a.html", sync, GAIT.data, **given))
+    assert "The figure shows" not in named.text + six.text
+    assert [len(figure.axes) for figure in figures[2::2]] == [8, 14, 12]
 
 
 def test_doubtful_trials_come_with_reasons(tmp_path):
