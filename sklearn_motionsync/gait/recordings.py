@@ -386,8 +386,8 @@ class Walk:
             return self._unit(nanmean([horizontal(x) for x in along], axis=0))
         apart = np.concatenate([horizontal(heel - self.pelvis) for heel in self.heels.values()])
         apart = apart[~np.isnan(apart).any(axis=1)]
-        _, _, axes = np.linalg.svd(apart - apart.mean(axis=0), full_matrices=False)
-        return np.tile(axes[0], (self.n_samples, 1))
+        axes = np.linalg.eigh(np.cov(apart, rowvar=False))[1]
+        return np.tile(axes[:, -1], (self.n_samples, 1))
 
     def _sense_of_swings(self):
         """1 if feet swing along `forward`, in which they are higher than on the ground; else -1."""

@@ -329,16 +329,19 @@ PARAMETERS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "kind",
-    ["whole", "belt", "slow belt", "sliding", "toes 9", "toes 18", "one foot", "gaps", "side view"],
-)
+@pytest.mark.parametrize("kind", [
+    "whole", "belt", "slow belt", "sliding", "toes 9", "toes 18", "short", "one foot", "gaps",
+    "side view",
+])  # fmt: skip
 def test_parameters_equal_those_by_hand(kind):
-    """Of centimetres; a strike and a foot-off are missing, and one foot-off is there twice."""
+    """Of centimetres; events are missing, there twice, and half a frame beyond the ends."""
     x, skeleton, feet, rate = changed(kind)
     walk = Walk(x, skeleton, joints_of_feet(skeleton, feet), rate, "Walk")
     events = events_of(walk)
-    events = [*events[:6], *events[7:11], *events[12:], ("Foot Off", "right", events[9][2] + 3)]
+    twice = [k + 3 for *of, k in events if of == ["Foot Off", "right"]][1:2]
+    events = [*events[:6], *events[7:11], *events[12:], *[("Foot Off", "right", k) for k in twice]]
+    ends = -0.4 * walk.per_frame, walk.n_samples - 1 + 0.4 * walk.per_frame
+    events += [("Foot Strike", side, k) for side, k in zip(("left", "right"), ends, strict=True)]
     events.sort(key=lambda event: event[2])
     names = ["label", "context", "frame"]
     table = pd.DataFrame([(a, b, k / walk.per_frame) for a, b, k in events], columns=names)
@@ -349,7 +352,7 @@ def test_parameters_equal_those_by_hand(kind):
     expected = parameters_by_hand(walk, events, walk.leg)
     values = found.drop(columns="unit").astype(float)
     np.testing.assert_allclose(values, [expected[name] for name in values.index], atol=1e-7)
-    assert (values["n"] > 1).sum() >= 4
+    assert (values["n"] > 0).sum() >= 4
 
 
 def test_feet_that_stand_have_no_length():
