@@ -36,7 +36,7 @@ from sklearn_motionsync.live import OnlineSynchronizer
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.report import write_player, write_report
-from sklearn_motionsync.synchronizers import blend_trials
+from sklearn_motionsync.synchronizers import blend_trials, dense
 
 from public import functions
 
@@ -375,15 +375,13 @@ def test_law(law, name, study, found):
 
 @pytest.mark.parametrize("name", sorted(CALLS))
 def test_a_trial_is_matched_once(name, study, monkeypatch):
-    matches = Counter()
-    for kind in (DenseSynchronizer, LinearSynchronizer):
-        match_of = kind._match
+    matches, matched = Counter(), dense.warp_in_portions
 
-        def counted(self, trials, *args, match_of=match_of, **kwargs):
-            matches.update((x.shape, np.nansum(x)) for x in trials)
-            return match_of(self, trials, *args, **kwargs)
+    def counted(warper, arrays, *args, **kwargs):
+        matches.update((x.shape, np.nansum(x)) for x in arrays)
+        return matched(warper, arrays, *args, **kwargs)
 
-        monkeypatch.setattr(kind, "_match", counted)
+    monkeypatch.setattr(dense, "warp_in_portions", counted)
     CALLS[name](study)
     # A detector fits its pipeline, which hands on no match, and then matches what it learns from.
     most = 2 if name == "ActionDetector.fit" else 1

@@ -34,7 +34,10 @@ def test_means_spreads_sizes_and_p_values_are_those_of_people(capsys):
     # Corrected for five events: the share of draws of which the largest t is as large.
     random = np.random.RandomState(0)
     orders = np.array([np.arange(16), *(random.permutation(16) for _ in range(1999))])
-    a, b = (of_people()[[np.flatnonzero(order % 2 == k) for order in orders]] for k in (0, 1))
+    # People are permuted in the order of their values.
+    by_value = of_people().sum(axis=1).argsort()
+    people, group = of_people()[by_value], by_value % 2
+    a, b = (people[[np.flatnonzero(group[order] == k) for order in orders]] for k in (0, 1))
     t = stats.ttest_ind(a, b, axis=1).statistic
     largest = np.abs(t).max(axis=1)
     shares = [np.mean(largest >= (1 - 1e-9) * abs(one)) for one in t[0]]

@@ -174,7 +174,7 @@ def test_units_of_the_synchronization_display(bunch, pipe):
             np.testing.assert_allclose(path.vertices[:, 1], expected, atol=1e-9)
         labels = " ".join(axis.get_xlabel() for axis in display.axes_)
         assert {"frames": "frame of", "percent": "% of", "seconds": "(s)"}[unit] in labels
-    with pytest.raises(ValueError, match="The frame rate of .* is not known"):
+    with pytest.raises(ValueError, match=r"The frame rate of .* is not known"):
         SynchronizationDisplay.from_estimator(pipe, bunch.data, unit="seconds")
 
 
@@ -192,7 +192,7 @@ def test_tables_tell_their_frame_rate(bunch, pipe):
             assert one.get_xlim() == other.get_xlim()
         plt.close("all")
         pytest_warns = pytest.warns(UserWarning, match="Trial 1 has 27 frames a second")
-        with pytest_warns, pytest.raises(ValueError, match="The frame rate of .* is not known"):
+        with pytest_warns, pytest.raises(ValueError, match=r"The frame rate of .* is not known"):
             display.from_estimator(pipe, [*tables[1:], bunch.data[0]], **given)
 
 
