@@ -7,6 +7,7 @@ a way that must not change what it finds. A public function without a row fails.
 import inspect
 import io
 import json
+import pickle
 import re
 from collections import Counter
 from typing import NamedTuple
@@ -391,6 +392,20 @@ def test_a_trial_is_matched_once(name, study, monkeypatch):
 @pytest.fixture(scope="module")
 def sync():
     return DenseSynchronizer(n_frames=51).fit(GAIT.data, keyframes=EVENTS)
+
+
+@pytest.mark.parametrize("wrap", [lambda sync: sync, make_pipeline])
+def test_a_match_is_of_its_trials(wrap, sync):
+    estimator = wrap(sync)
+    match = Match.from_estimator(estimator, GAIT.data, keyframes=EVENTS, frame_rate=1.0)
+    for X in (GAIT.data[::-1], GAIT.data[1:], [x + 1 for x in GAIT.data]):
+        with pytest.raises(ValueError, match=r"Match of 24 trials, and X are other ones"):
+            compare_groups(match, X, GAIT.group)
+    with pytest.raises(TypeError, match="'keyframes' beside a Match"):
+        compare_groups(match, GAIT.data, GAIT.group, keyframes=EVENTS)
+    with pytest.raises(ValueError, match="not by a synchronizer in memory"):
+        compare_groups(pickle.loads(pickle.dumps(match)), GAIT.data, GAIT.group)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(match)).seconds(), match.seconds())
 
 
 def test_a_live_synchronizer_takes_keyframes_in_its_seconds():

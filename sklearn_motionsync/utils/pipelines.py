@@ -12,9 +12,11 @@ from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.collections import Trials, as_collection, as_source
 from ..inputs.keyframes import Keyframes
 from ..inputs.resampling import as_frame_rates
 from ..inputs.trial_facts import TrialFacts
+from ..inputs.wording import counted
 
 __all__ = [
     "MissingMetadata",
@@ -95,6 +97,9 @@ class Routed(NamedTuple):
         Of the trials as they were recorded.
     caller, hint : str
         As of `explain_missing`.
+    sums : ndarray, shape (n_sequences,), or None
+        Of the values of the trials before the steps, which tell others of equal lengths; None
+        where there are no steps.
     known : Match or None
         That of these trials, if they were matched before.
     """
@@ -106,6 +111,7 @@ class Routed(NamedTuple):
     facts: TrialFacts
     caller: str = "match"
     hint: str = ""
+    sums: np.ndarray | None = None
     known: object = None
 
     @property
@@ -177,7 +183,15 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     trials = synchronizer.check_trials(features)
     accepted = accepted_params(synchronizer.match, params)
     facts = TrialFacts.of(X, params.get("frame_rate"), checked=trials)
-    return Routed(before, synchronizer, facts.label(trials), accepted, facts, caller, hint)
+    sums = None if before is None else _sums_of(X, trials)
+    return Routed(before, synchronizer, facts.label(trials), accepted, facts, caller, hint, sums)
+
+
+def _sums_of(X, trials):
+    """The sum of the values of each trial, of checked ones where X is read once."""
+    is_read = isinstance(X, Trials) or as_source(X) is not None
+    sequences = None if is_read else as_collection(X)
+    return np.array([np.sum(np.asarray(x, dtype=np.float64)) for x in sequences or trials])
 
 
 def _of_match(match, X, params, caller, kind):
@@ -197,10 +211,12 @@ def _of_match(match, X, params, caller, kind):
             f"give {beside[0]} to match, or the estimator to {caller}."
         )
     facts = TrialFacts.of(X, params.get("frame_rate"), checked=reached.trials)
-    if not np.array_equal(facts.lengths, match.facts.lengths):
+    sums = _sums_of(reached.trials, reached.trials) if reached.sums is None else reached.sums
+    same = np.array_equal(facts.lengths, match.facts.lengths)
+    if not (same and np.allclose(_sums_of(X, reached.trials), sums, 1e-9, equal_nan=True)):
         raise ValueError(
-            f"{caller} got a Match of {len(match.times)} trials, and X are others: "
-            f"{len(facts.lengths)}, or of other lengths. Give the X that were matched."
+            f"{caller} got a Match of {counted(len(sums), 'trial')}, and X are other ones, or in "
+            "another order. Give the X that were matched."
         )
     if not facts.are_timed:
         facts = facts._replace(frame_rates=match.facts.frame_rates)
