@@ -393,7 +393,7 @@ def test_slopes_within_people_and_what_is_compared_in_words():
     given = {"y": [*"aabbcc"], "covariate": False, "paired": False, "n": 6}
     assert Study.of(**given, groups=range(6)).words == "a, b and c, 6 people of one trial each"
     assert Study.of(**given, groups=None).words == "a, b and c, 6 trials"
-    given["y"] = [1.0, 1, 1, 2, 2, 2]  # labels, as they are whole
+    given["y"] = [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]  # labels, as they are whole
     assert Study.of(**given, groups=None).words == "1.0 and 2.0, 6 trials"
     given |= {"y": [*"aabb"] * 4, "groups": np.arange(16) // 4}
     assert Study.of(**given | {"paired": True, "n": 16}).words == "b less a, 4 people"
