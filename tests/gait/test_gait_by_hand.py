@@ -342,6 +342,7 @@ def test_parameters_equal_those_by_hand(kind):
     events = [*events[:6], *events[7:11], *events[12:], *[("Foot Off", "right", k) for k in twice]]
     ends = -0.4 * walk.per_frame, walk.n_samples - 1 + 0.4 * walk.per_frame
     events += [("Foot Strike", side, k) for side, k in zip(("left", "right"), ends, strict=True)]
+    events.append(("Foot Off", "left", ends[0] + 0.3))
     events.sort(key=lambda event: event[2])
     names = ["label", "context", "frame"]
     table = pd.DataFrame([(a, b, k / walk.per_frame) for a, b, k in events], columns=names)
