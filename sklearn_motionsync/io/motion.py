@@ -93,25 +93,9 @@ def read_motion(
         Of several files a list. Float64 columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint
         by joint, and an index named "frame", from 0. A marker that was not seen is NaN. The group
         "analog" has a column for each channel, and a row for each sample; a MOT or STO file a
-        column for each of its own but the time. The manual's page of motion files lists its
-        ``attrs``, which hold
-
-        format : {"bvh", "amc", "c3d", "trc", "mot", "sto"}
-            The ending of the file.
-        frame_rate : float or None
-            Frames per second, None if it is not known, or if times are uneven.
-        units : str, list of str or None
-            That the file states; a list for the group "analog", one for each channel.
-        up : {"y", "z"} or None
-            The vertical axis, if the file states it or its format has one.
-        kind : str
-            What was measured: "joints", "markers" or another group; of MOT and STO "forces" or
-            "coordinates".
-        joints, parents : list of str, list of int
-            Names of the joints or markers, and the index of each one's parent, -1 for a root; for
-            the group "analog", MOT and STO ``channels`` instead.
-        trial, levels : str, list of str
-            The name of the file without the ending, and the names of the levels of an index.
+        column for each of its own but the time. Its ``attrs`` hold ``format``, ``frame_rate``,
+        ``units``, ``up``, ``kind``, ``joints`` and ``parents`` or ``channels``, ``trial`` and
+        ``levels``; the manual's page of motion files explains them, and what else each format adds.
 
     Raises
     ------

@@ -38,8 +38,8 @@ def read_example(folder, ending, **params):
         ("docs/howto/motion_files.md does not mention `{}`", lambda end: f"`{end}`" in MANUAL),
         ("the docstring of read_motion does not mention ``{}``", lambda end: f"``{end}``" in DOC),
         (
-            "the docstring of read_motion does not list {}, without the dot, as a format",
-            lambda end: f'"{end[1:]}"' in DOC.partition("format : ")[2],
+            "docs/howto/motion_files.md does not list {}, without the dot, as a `format`",
+            lambda end: f'"{end[1:]}"' in MANUAL.partition("| `format` |")[2].partition("\n")[0],
         ),
     ],
     ids=["example", "fuzz", "manual", "docstring", "format"],
