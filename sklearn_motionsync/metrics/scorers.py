@@ -22,7 +22,46 @@ __all__ = ["FeatureHoldoutScorer", "SpreadScorer"]
 
 
 class _SynchronizerScorer(BaseEstimator):
-    """Base of the scorers: the metadata requests, and what is scored."""
+    """Base of the scorers: the metadata requests, and what is scored.
+
+    A scorer has a ``_score(reached, params)``, of the synchronizer and the trials that `_reach`
+    found; ``_uses`` names the methods whose metadata it takes.
+    """
+
+    _uses: tuple[str, ...] = ("match",)
+
+    def __call__(
+        self, estimator: BaseEstimator, X: TrialsLike, y: object = None, **params: Any
+    ) -> float:
+        """Score a fitted estimator on trials.
+
+        Parameters
+        ----------
+        estimator : synchronizer or Pipeline
+            Fitted; the pipeline has a synchronizer.
+        X : list of arrays, 3-D array or DataFrame
+            At least two trials, as for the estimator; to hold features out, of at least ``n_folds``
+            features.
+        y : ignored
+            Present for API consistency.
+        **params : dict
+            Metadata of the synchronizer's ``match``, and of its ``fit`` where the scorer fits it
+            anew, such as ``keyframes``; in cross-validation requested by `set_score_request`.
+
+        Returns
+        -------
+        float
+            The score; greater is better.
+
+        Raises
+        ------
+        ValueError
+            If there is no synchronizer, a single trial, or the synchronizer needs key-frames
+            and gets none; if features are held out of a single one.
+        TypeError
+            If the synchronizer does not accept one of the params.
+        """
+        return self._score(self._reach(estimator, X, params), params)
 
     def get_metadata_routing(self):
         """The metadata that the scorer requests from cross-validation and searches.
@@ -71,7 +110,7 @@ class _SynchronizerScorer(BaseEstimator):
         # Key-frames that are given but neither requested nor declined are an error.
         return getattr(self, "_requests", {"keyframes": None})
 
-    def _reach(self, estimator, X, params, uses=("match",)):
+    def _reach(self, estimator, X, params):
         """The synchronizer and the trials, at least two."""
         name = type(self).__name__
         hint = (
@@ -79,7 +118,9 @@ class _SynchronizerScorer(BaseEstimator):
             f"enable_metadata_routing=True), scoring={name}().set_score_request({{name}}=True), "
             "and params={{'{name}': [...]}} or search.fit(X, {name}=[...])"
         )
-        reached = route_to_synchronizer(estimator, X, params, f"{name}()", uses=uses, hint=hint)
+        reached = route_to_synchronizer(
+            estimator, X, params, f"{name}()", uses=self._uses, hint=hint
+        )
         if len(reached.trials) < 2:
             raise ValueError(
                 f"{name} measures how much trials differ from each other, and got one. "
@@ -113,37 +154,8 @@ class SpreadScorer(_SynchronizerScorer):
     (2,)
     """
 
-    def __call__(
-        self, estimator: BaseEstimator, X: TrialsLike, y: object = None, **params: Any
-    ) -> float:
-        """Score a fitted estimator on trials.
-
-        Parameters
-        ----------
-        estimator : synchronizer or Pipeline
-            Fitted; the pipeline has a synchronizer.
-        X : list of arrays, 3-D array or DataFrame
-            At least two trials, as for the estimator.
-        y : ignored
-            Present for API consistency.
-        **params : dict
-            Metadata of the synchronizer's ``match``, such as ``keyframes``; in
-            cross-validation requested by `set_score_request`.
-
-        Returns
-        -------
-        float
-            The score; greater is better.
-
-        Raises
-        ------
-        ValueError
-            If there is no synchronizer, a single trial, or the synchronizer needs key-frames
-            and gets none.
-        TypeError
-            If the synchronizer does not accept one of the params.
-        """
-        reached = self._reach(estimator, X, params)
+    def _score(self, reached, params):
+        """The negated spread of the trials that are matched with the fitted pattern."""
         before = reached.synchronizer.normalize(reached.trials)
         return -least_squares(before, reached.match().warp(reached.trials))
 
@@ -183,6 +195,8 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
     {'max_offset': 0.25}
     """
 
+    _uses = "match", "fit"
+
     def __init__(
         self,
         n_folds: int = 3,
@@ -191,37 +205,8 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         self.n_folds = n_folds
         self.random_state = random_state
 
-    def __call__(
-        self, estimator: BaseEstimator, X: TrialsLike, y: object = None, **params: Any
-    ) -> float:
-        """Score a fitted estimator on trials.
-
-        Parameters
-        ----------
-        estimator : synchronizer or Pipeline
-            Fitted; the pipeline has a synchronizer.
-        X : list of arrays, 3-D array or DataFrame
-            At least two trials of at least ``n_folds`` features, as for the estimator.
-        y : ignored
-            Present for API consistency.
-        **params : dict
-            Metadata of the synchronizer's ``fit`` and ``match``, such as ``keyframes``;
-            in cross-validation requested by `set_score_request`.
-
-        Returns
-        -------
-        float
-            The mean score of the folds; greater is better.
-
-        Raises
-        ------
-        ValueError
-            If there is no synchronizer, a single trial, a single feature, or the synchronizer
-            needs key-frames and gets none.
-        TypeError
-            If the synchronizer does not accept one of the params.
-        """
-        reached = self._reach(estimator, X, params, ("match", "fit"))
+    def _score(self, reached, params):
+        """The mean score of the folds, each by clones that are fitted without it."""
         synchronizer, trials = reached.synchronizer, reached.trials
         n_features = trials[0].shape[1]
         if n_features < 2:
