@@ -257,7 +257,8 @@ class Skeleton:
         parents = _without_still_roots(df, joints, parents, held)
         up = attrs.get("up") if up is None else up
         skeleton = cls(joints, parents, all_landmarks, "y" if up is None else up, n_dims)
-        estimate = _estimate_up(df, skeleton) if up is None else None
+        positions = _positions_of(df) if up is None else None
+        estimate = None if positions is None else estimate_up(positions, skeleton)
         return (
             skeleton if estimate is None else cls(joints, parents, all_landmarks, estimate, n_dims)
         )
@@ -483,12 +484,6 @@ def _positions_of(df):
         return as_numbers(df, "df", dtype=np.float64)
     except (TypeError, ValueError):
         return None
-
-
-def _estimate_up(df, skeleton):
-    """The vertical axis estimated from a table of positions, or None."""
-    positions = _positions_of(df)
-    return None if positions is None else estimate_up(positions, skeleton)
 
 
 def _without_still_roots(df, joints, parents, held):

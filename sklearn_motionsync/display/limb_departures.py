@@ -188,7 +188,7 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, limit, refer
     whose = "a new person" if reference is None else "this person"
     rare = [describe_departure(row) for row in rows if row.rare and row.limb is not None]
     heading = (
-        f"{name.replace('Trial', 'Trial', 1)} is {verdict}{note}.\n"
+        f"{name} is {verdict}{note}.\n"
         f"Rare: {', '.join(rare) if rare else 'nothing'}. Violet: limbs that depart at or around "
         f"that frame. Pale: what is expected of {whose}."
     )

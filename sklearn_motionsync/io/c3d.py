@@ -7,13 +7,11 @@ import numpy as np
 
 from ..inputs.resampling import is_rate
 from ..inputs.wording import counted
-from .text import decode, make_unique
+from .text import UNSEEN, decode, make_unique
 
 _BLOCK = 512
 # How processors write numbers: Intel, DEC and MIPS.
 _LITTLE, _DEC, _BIG = 84, 85, 86
-# Coordinates that Cortex writes for a marker it did not see.
-_UNSEEN = 9999999.0
 # Groups of points that are computed from markers. There may be others, which have units.
 _COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 # The header has room for so many events, and this number where their labels have 4 characters.
@@ -370,7 +368,7 @@ def _read_points(frames, points, computed):
         # leave a marker that no camera saw at the origin, with a 0 here.
         has_camera = (cameras > 0) & (cameras < 2**15)
         seen &= ~zero | has_camera | all_zero
-        seen &= ~(positions == _UNSEEN).all(axis=2)
+        seen &= ~(positions == UNSEEN).all(axis=2)
     positions[~seen] = np.nan
     return positions
 

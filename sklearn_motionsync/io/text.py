@@ -13,6 +13,8 @@ from ..inputs.wording import counted
 
 # No number of a file is larger, in any unit; and no position or angle: 10 km in millimetres.
 _LARGEST, FARTHEST = 1e12, 1e7
+# Coordinates that Cortex writes for a marker it did not see.
+UNSEEN = 9999999.0
 # Bytes of a table that are parsed at once: memory beside the file and its numbers stays constant.
 PORTION = 2**22
 # The characters of plain decimal numbers and of the blanks between them.

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..inputs.wording import counted
 from .text import (
+    UNSEEN,
     MotionText,
     decode,
     make_unique,
@@ -16,8 +17,6 @@ from .text import (
     split_fields,
 )
 
-# Coordinates that Cortex writes for a marker it did not see.
-_UNSEEN = 9999999.0
 _AXIS = re.compile(rb"[XYZxyz]\d*")
 
 
@@ -125,7 +124,7 @@ def _split_rows(text, row, n_markers):
 def _hide_unseen(positions):
     """NaN where a marker has no position, or the one that writers give to markers not seen."""
     zero = (positions == 0).all(axis=2)
-    unseen = np.isnan(positions).any(axis=2) | (positions == _UNSEEN).all(axis=2)
+    unseen = np.isnan(positions).any(axis=2) | (positions == UNSEEN).all(axis=2)
     if not (zero | unseen).all():
         unseen |= zero
     positions[unseen] = np.nan
