@@ -23,16 +23,11 @@ REBASED = 4096
 
 
 class CausalDerivative:
-    """The velocity of streams at their last sample.
+    """The velocity of streams (n_streams, n_features) at their last sample.
 
-    Parameters
-    ----------
-    width : float
-        Time constant of both filters, in samples; 0 for the plain difference.
-    shape : tuple (n_streams, n_features)
-    from_rest : bool, default=True
-        Whether streams are at rest before their first sample; else their velocity is known from the
-        second one on.
+    ``width`` is the time constant of both filters in samples, 0 for the plain difference. Streams
+    are at rest before their first sample; without ``from_rest`` their velocity is known from the
+    second one on.
     """
 
     def __init__(self, width, shape, from_rest=True):
@@ -53,13 +48,10 @@ class CausalDerivative:
         self._steady = False
 
     def step(self, sample):
-        """Velocity by the sample, NaN where it is unknown: (n_streams, n_features).
+        """Velocity by the sample, both (n_streams, n_features); NaN where it is unknown.
 
-        Parameters
-        ----------
-        sample : ndarray, shape (n_streams, n_features)
-            NaN where nothing was observed. Across a short gap the velocity is taken as constant;
-            after a long one the filter restarts with the second sample.
+        A sample is NaN where nothing was observed. Across a short gap the velocity is taken as
+        constant; after a long one the filter restarts with the second sample.
         """
         if self._steady and not np.isnan(sample).any():
             velocity = sample - self._last
@@ -95,23 +87,12 @@ class CausalDerivative:
 
 
 def causal_velocity(positions, subframes, width, cyclic=False):
-    """Causal velocity of a whole sequence, at every position, by the frame.
+    """Causal velocity of a whole sequence (Q, n_features), at every position, by the frame.
 
-    Parameters
-    ----------
-    positions : ndarray, shape (Q, n_features)
-        ``subframes`` positions a frame. Every position is filtered with those whole frames before
-        it, as samples of a stream are. Without NaN.
-    subframes : int
-    width : float
-        Time constant in frames.
-    cyclic : bool, default=False
-        Whether the sequence was repeated before, and its last position is the first one again.
-        Otherwise it was at rest.
-
-    Returns
-    -------
-    ndarray, shape (Q, n_features)
+    Every position, of which there are ``subframes`` a frame, is filtered with those whole frames
+    before it, as samples of a stream are, with a time constant of ``width`` frames. It is without
+    NaN. A cyclic sequence was repeated before, and its last position is the first one again; any
+    other was at rest.
     """
     if cyclic:
         n = len(positions) - 1
@@ -139,26 +120,14 @@ def _kept_share(width):
 
 
 class CausalTrellis:
-    """The trellis of streams against one moving sequence, row by row.
+    """The trellis of streams against one moving sequence (Q, n_features), row by row.
 
-    Parameters
-    ----------
-    trellis : Trellis
-        With ``running=True``.
-    moving : ndarray, shape (Q, n_features)
-    n_streams : int, default=1
-    cyclic : bool, default=False
-        Whether the moving sequence goes on with its first position after the last one, which is
-        the same. Paths then begin at any position.
-    restart_cost : float, default=inf
-        What a new attempt pays: a path that goes on from any position to the first one.
+    The ``trellis`` has ``running=True``. A cyclic moving sequence goes on with its first position
+    after the last one, which is the same, and paths then begin at any position. A new attempt, a
+    path that goes on from any position to the first one, pays ``restart_cost``.
 
-    Attributes
-    ----------
-    n_samples : int
-        Samples so far.
-    attempts : ndarray of int, shape (n_streams,)
-        How often a new attempt became cheaper than the one before, which then ends.
+    ``n_samples`` counts the samples so far; ``attempts`` (n_streams,) how often a new attempt
+    became cheaper than the one before, which then ends.
     """
 
     def __init__(self, trellis, moving, n_streams=1, cyclic=False, restart_cost=np.inf):
@@ -179,16 +148,12 @@ class CausalTrellis:
         self._begins[stream] = True
 
     def advance(self, samples, partial=None, moves=None):
-        """Take one sample of every stream.
+        """Take one sample of every stream (n_streams, n_features).
 
-        Parameters
-        ----------
-        samples : ndarray, shape (n_streams, n_features)
-        partial : dict of {tuple of int: (ndarray (n, n_features'), ndarray (Q, n_features'))}
-            For streams with missing features: the observed features of their samples and of
-            the moving sequence; None where all are missing.
-        moves : ndarray of bool, shape (n_streams,), default=None
-            Streams that move: the others begin no other attempt meanwhile. None: all.
+        Of streams with missing features, ``partial`` has by a tuple of their numbers the observed
+        features of their samples and of the moving sequence, or None where all are missing. Streams
+        that do not move, by the mask ``moves``, begin no other attempt meanwhile; None says that
+        all move.
         """
         tile, p, high = self._tile, self.n_samples, self.trellis.width
         if not self._cyclic:

@@ -94,16 +94,8 @@ class Track(NamedTuple):
 class PooledFilter:
     """A Kalman filter of deviations from the mean of all phases: it knows no phase.
 
-    Parameters
-    ----------
-    model : TrackerModel
-
-    Attributes
-    ----------
-    accepted : ndarray of bool, shape (n_observed,)
-        The observations of the last frame that were used.
-    innovation : float or None
-        Their NIS; None without any.
+    ``accepted`` (n_observed,) are the observations of the last frame that were used, and
+    ``innovation`` is their NIS, None without any.
     """
 
     def __init__(self, model):
@@ -131,14 +123,10 @@ class PooledFilter:
 
 
 class RunningTake:
-    """A take that is tracked frame by frame, by both members. Parameters as of `ParticleFilter`.
+    """A take that is tracked frame by frame, by both members, ``phases`` and ``pooled``.
 
-    Attributes
-    ----------
-    phases : ParticleFilter
-    pooled : PooledFilter
-    evidence : ndarray, shape (2,)
-        Averages of the NIS of innovations of both: 1 is expected.
+    Its parameters are those of `ParticleFilter`. ``evidence`` (2,) has the averages of the NIS of
+    innovations of both, of which 1 is expected.
     """
 
     def __init__(self, model, seed, time, n_observed):
@@ -179,20 +167,9 @@ class RunningTake:
 def pool(estimates, evidence, model):
     """The logarithmic opinion pool of Gaussian estimates: ``C^-1 = sum_m w_m C_m^-1``, sum of w 1.
 
-    Covariances are larger by the evidence: by the average NIS where that is above 1. The weights
-    are those before, divided by the mean variance in units of the pooled variances.
-
-    Parameters
-    ----------
-    estimates : tuple of tuple
-        Mean (n_features,) and covariance of each member.
-    evidence : ndarray, shape (n_members,)
-    model : TrackerModel
-
-    Returns
-    -------
-    mean : ndarray, shape (n_features,)
-    covariance : ndarray, shape (n_features, n_features)
+    ``estimates`` has the mean (n_features,) and the covariance of each member, and so has the
+    result. Covariances are larger by the evidence: by the average NIS where that is above 1. The
+    weights are those before, divided by the mean variance in units of the pooled variances.
     """
     scale = np.diag(model.pooled.covariance)
     excess = np.maximum(evidence, 1.0)
@@ -216,31 +193,19 @@ def stack_frames(frames, dtype):
 def filter_take(model, seed, values, times, observer):
     """The filtered frames of a take, each given the observations up to it.
 
-    Parameters and returns are those of `smooth_take`.
+    It is called, and returns, as `smooth_take` does.
     """
     running = RunningTake(model, seed, times[0], len(observer.matrix))
     return [running.step(*frame, observer) for frame in zip(values, times, strict=True)]
 
 
 def smooth_take(model, seed, values, times, observer):
-    """The smoothed frames of a take, each given all observations.
+    """The smoothed frames of a take, each a `Track` given all observations.
 
-    Paths of phases are drawn by backward simulation from the particles of the filter. Along each
-    path the deviations are smoothed; the paths have equal weights. So are those of the member that
-    knows no phase.
-
-    Parameters
-    ----------
-    model : TrackerModel
-    seed : int
-    values : ndarray, shape (n_frames, n_observed)
-    times : ndarray, shape (n_frames,)
-    observer : Observer
-
-    Returns
-    -------
-    list of Track
-        One a frame.
+    ``values`` (n_frames, n_observed) were seen by an `Observer` at ``times`` (n_frames,). Paths of
+    phases are drawn by backward simulation from the particles of the filter. Along each path the
+    deviations are smoothed; the paths have equal weights. So are those of the member that knows no
+    phase.
     """
     running = RunningTake(model, seed, times[0], values.shape[1])
     history, accepted, evidence = [], [], []
@@ -311,18 +276,9 @@ class HistoryFrame(NamedTuple):
 class PathFrame(NamedTuple):
     """A frame of several hypotheses that share their observations.
 
-    Parameters
-    ----------
-    dt : float
-        Time since the frame before.
-    initial : bool
-        Whether nothing is known of what was before.
-    expected : ndarray, shape (n_paths, n_features)
-        What the deviations are from.
-    jumps : ndarray, shape (n_paths, n_features), or None
-        By which deviations change where what they are from changes.
-    values : ndarray, shape (n_observed,)
-        NaN where nothing was accepted.
+    ``dt`` is the time since the frame before, of which nothing is known if it is ``initial``.
+    Deviations are from ``expected`` (n_paths, n_features), and change by ``jumps`` of that shape
+    where it changes. ``values`` (n_observed,) are NaN where nothing was accepted.
     """
 
     dt: float
@@ -333,14 +289,7 @@ class PathFrame(NamedTuple):
 
 
 def simulate_backwards(model, history, rng):
-    """Indices of the particles on each path: (n_frames, n_paths).
-
-    Parameters
-    ----------
-    model : TrackerModel
-    history : list of HistoryFrame
-    rng : Generator
-    """
+    """Indices of the particles on each path, given each `HistoryFrame`: (n_frames, n_paths)."""
     paths = [systematic_resampling(history[-1].particles.weights, rng.random(), _N_PATHS)]
     for before, after in zip(history[-2::-1], history[:0:-1], strict=True):
         log_weights = np.tile(before.particles.log_weights, (_N_PATHS, 1))
@@ -369,19 +318,9 @@ def _log_transition(model, before, after, path):
 def smooth_deviations(process, frames, observer):
     """Poses of several hypotheses given all observations, and their common covariance.
 
-    That is the modified Bryson-Frazier smoother, which inverts the innovation covariance only. The
-    Kalman filter runs twice, first for the states at the beginning of each block of frames.
-
-    Parameters
-    ----------
-    process : MaternProcess
-    frames : list of PathFrame
-    observer : Observer
-
-    Returns
-    -------
-    list of tuple
-        Of each frame the poses (n_paths, n_features), and the covariance.
+    Of each `PathFrame` there are the poses (n_paths, n_features), and the covariance. That is the
+    modified Bryson-Frazier smoother, which inverts the innovation covariance only. The Kalman
+    filter runs twice, first for the states at the beginning of each block of frames.
     """
     blocks = [slice(i, i + _BLOCK) for i in range(0, len(frames), _BLOCK)]
     states = [DeviationFilter(process, len(frames[0].expected))]
@@ -463,33 +402,14 @@ class ParticleFilter:
     """Particles of phase and rate, with a Kalman filter of the deviations of each.
 
     All particles share one covariance of their deviations, which depends on what is observed and
-    not on the phase; so one Kalman gain serves them all.
+    not on the phase; so one Kalman gain serves them all. ``time`` is that of the first frame, which
+    ``update`` still has to take, and then of the last one; ``n_observed`` counts its numbers.
 
-    Parameters
-    ----------
-    model : TrackerModel
-    seed : int
-    time : float
-        Of the first frame, which ``step`` still has to take.
-    n_observed : int
-        Its numbers.
-
-    Attributes
-    ----------
-    time : float
-        Of the last frame.
-    particles : Particles
-        Weighted by the last frame.
-    initial : bool
-        Whether the particles know nothing of what was before the last frame.
-    expected : ndarray, shape (n_particles, n_features)
-        The mean trial at their phases.
-    deviations : DeviationFilter
-    accepted : ndarray of bool, shape (n_observed,)
-        The observations of the last frame that were used.
-    innovation : float or None
-        Their NIS, the mean over the particles before they were weighted; None without any.
-    lost : bool
+    ``particles`` are weighted by the last frame, and ``initial`` tells whether they know nothing of
+    what was before it. ``expected`` (n_particles, n_features) is the mean trial at their phases.
+    ``accepted`` (n_observed,) are the observations of the last frame that were used, and
+    ``innovation`` is their NIS, the mean over the particles before they were weighted; None without
+    any.
     """
 
     def __init__(self, model, seed, time, n_observed):
@@ -511,15 +431,9 @@ class ParticleFilter:
         return pose, self.deviations.pose_covariance + off.T @ off
 
     def update(self, values, time, observer):
-        """Take an observation.
+        """Take an observation (n_observed,), NaN where nothing is seen.
 
-        Parameters
-        ----------
-        values : ndarray, shape (n_observed,)
-            NaN where nothing is seen.
-        time : float
-            In frames of the training trials, later than that of the frame before.
-        observer : Observer
+        Its time, in frames of the training trials, is later than that of the frame before.
         """
         dt, self.time = time - self.time, time
         self.since_search += dt
@@ -620,19 +534,11 @@ class ParticleFilter:
 
 
 class Particles(NamedTuple):
-    """Weighted particles of phase and log rate.
+    """Weighted particles of phase, in frames of the clock, and log rate: (n,) each.
 
     The phase goes on by the rate, and the log rate is an Ornstein-Uhlenbeck process. At the last
-    frame the phase stays, until the movement restarts; restart times are exponential.
-
-    Parameters
-    ----------
-    phases : ndarray, shape (n,)
-        Frames of the clock.
-    log_rates : ndarray, shape (n,)
-    log_weights : ndarray, shape (n,)
-    restarted : ndarray of bool, shape (n,)
-        Whether the movement restarted in the last move.
+    frame the phase stays, until the movement restarts, as ``restarted`` says of the last move;
+    restart times are exponential.
     """
 
     phases: np.ndarray

@@ -79,20 +79,10 @@ class TrackerModel(NamedTuple):
 
     @classmethod
     def learn(cls, warped, rates, groups, clock, noise, tempering, n_particles):
-        """Learn from synchronised trials.
+        """Learn from at least two synchronised trials (n, P, n_features), of at least two groups.
 
-        Parameters
-        ----------
-        warped : ndarray, shape (n, P, n_features)
-            At least two trials.
-        rates : ndarray, shape (n, P)
-            Their rates along the clock.
-        groups : ndarray of int, shape (n,)
-            At least two groups, counted from 0.
-        clock : Clock
-        noise : ndarray, shape (n_features, n_features)
-        tempering, n_particles :
-            As of the tracker.
+        ``rates`` (n, P) are those along the clock, and groups are counted from 0. The other
+        arguments are kept in the model as they are.
         """
         deviations, step = warped - mean_of_others(warped, groups), 1 / clock.speed
         process = MaternProcess.learn(deviations, _SHRINKAGE, step)
@@ -130,12 +120,8 @@ class TrackerModel(NamedTuple):
 class Clock(NamedTuple):
     """The clock of the pattern, and times in frames of the training trials.
 
-    Parameters
-    ----------
-    last : float
-        The last frame of the clock.
-    duration : float
-        Mean time from the first frame of a trial to its last.
+    ``last`` is the last frame of the clock, ``duration`` the mean time from the first frame of a
+    trial to its last.
     """
 
     last: float
@@ -232,12 +218,7 @@ class MaternProcess(NamedTuple):
 class RateProcess(NamedTuple):
     """The log rate: an Ornstein-Uhlenbeck process about 0, the mean pace.
 
-    Parameters
-    ----------
-    spread : float
-        Standard deviation of the log rate.
-    memory : float
-        Time after which its correlation is 1/e.
+    ``spread`` is its standard deviation, ``memory`` the time after which its correlation is 1/e.
     """
 
     spread: float
@@ -348,17 +329,8 @@ _MIN_WEIGHT = 1e-3
 class CausalSlopes:
     """Slopes of regression lines through past values with weights ``exp(-age / window)``.
 
-    All sequences share the weights. So the slope of a difference is the difference of the slopes,
-    whose delays cancel.
-
-    Parameters
-    ----------
-    n : int
-        Sequences.
-    width : int
-        Features.
-    window : float
-        Age at which a value weighs 1/e.
+    All n sequences of ``width`` features share the weights. So the slope of a difference is the
+    difference of the slopes, whose delays cancel.
     """
 
     def __init__(self, n, width, window):
@@ -451,36 +423,6 @@ class KalmanUpdate(NamedTuple):
         return self.whitened @ self.gain_rows.reshape(n_seen, 2, n_features).swapaxes(0, 1)
 
 
-def kalman_update(covariance, matrix, innovations, noise):
-    """The Kalman update.
-
-    Parameters
-    ----------
-    covariance : ndarray, shape (2 n_features, 2 n_features)
-        Of the values, then derivatives, before the observation.
-    matrix : ndarray, shape (n_seen, n_features)
-        ``H``, without rows of missing numbers.
-    innovations : ndarray, shape (n, n_seen)
-        ``v`` of every hypothesis.
-    noise : ndarray, shape (n_seen, n_seen)
-        Covariance of the noise of the observation.
-
-    Returns
-    -------
-    covariance : ndarray, shape (2 n_features, 2 n_features)
-        After it: symmetric.
-    KalmanUpdate
-    """
-    n_seen, n_features = matrix.shape
-    cross_covariance = covariance[:, :n_features] @ matrix.T
-    innovation_covariance = matrix @ cross_covariance[:n_features] + noise
-    innovation_covariance[np.diag_indices(n_seen)] *= 1 + _MARGIN
-    whiten = whitening(innovation_covariance)
-    gain_rows = whiten @ cross_covariance.T
-    update = KalmanUpdate(innovations @ whiten.T, gain_rows, whiten @ matrix)
-    return covariance - gain_rows.T @ gain_rows, update
-
-
 def whitening(covariance):
     """The inverse of the Cholesky factor of a covariance."""
     return dtrtri(np.linalg.cholesky(covariance), lower=1)[0]
@@ -492,21 +434,10 @@ def squared_norms(vectors):
 
 
 class DeviationFilter:
-    """A Kalman filter of the deviations of several hypotheses, from what each expects.
+    """A Kalman filter of the deviations of n hypotheses, from what each expects.
 
-    The covariance depends on what is observed and not on the hypothesis.
-
-    Parameters
-    ----------
-    process : MaternProcess
-    n : int
-        Hypotheses.
-
-    Attributes
-    ----------
-    means : ndarray, shape (2, n, n_features)
-        Of values and derivatives.
-    covariance : ndarray, shape (2 n_features, 2 n_features)
+    ``means`` (2, n, n_features) are of values and derivatives. The ``covariance`` (2 n_features, 2
+    n_features) depends on what is observed and not on the hypothesis.
     """
 
     def __init__(self, process, n):
@@ -529,26 +460,23 @@ class DeviationFilter:
         self.means, self.covariance = self.process.predict(self.means, self.covariance, dt)
 
     def correct(self, residuals, rows, noise, gate=np.inf):
-        """Take an observation, unless it is outside the gate of every hypothesis.
+        """Take an observation, unless its NIS is beyond the gate of every hypothesis.
 
-        Parameters
-        ----------
-        residuals : ndarray, shape (n, n_seen)
-            Of what is observed, from what each hypothesis expects without a deviation.
-        rows : ndarray, shape (n_seen, n_features)
-        noise : ndarray, shape (n_seen, n_seen)
-        gate : float
-            NIS beyond which it is ignored.
-
-        Returns
-        -------
-        KalmanUpdate or None
-            None if it is ignored.
+        ``residuals`` (n, n_seen) are from what each hypothesis expects without a deviation;
+        ``rows`` (n_seen, n_features) and ``noise`` are those of the `Observer`. Returns the
+        `KalmanUpdate`, or None if the observation is ignored.
         """
         innovations = residuals - self.means[0] @ rows.T
+        width = rows.shape[1]
         # What overflows is outside the gate.
         with np.errstate(over="ignore", invalid="ignore"):
-            covariance, update = kalman_update(self.covariance, rows, innovations, noise)
+            cross_covariance = self.covariance[:, :width] @ rows.T
+            innovation_covariance = rows @ cross_covariance[:width] + noise
+            innovation_covariance[np.diag_indices(len(rows))] *= 1 + _MARGIN
+            whiten = whitening(innovation_covariance)
+            gain_rows = whiten @ cross_covariance.T
+            update = KalmanUpdate(innovations @ whiten.T, gain_rows, whiten @ rows)
+            covariance = self.covariance - gain_rows.T @ gain_rows
             if not (update.nis <= gate).any():
                 return None
         self.means = self.means + update.corrections

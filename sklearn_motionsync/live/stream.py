@@ -80,21 +80,9 @@ class LivePhase(NamedTuple):
 class Session:
     """Trials that run side by side, from their first frame on.
 
-    Parameters
-    ----------
-    reference : Reference
-    frame : ndarray, shape (n_features,) or (n_streams, n_features)
-        The first frame, which ``step`` still has to take.
-    time : float
-        Its time, in frames of the training trials.
-
-    Attributes
-    ----------
-    time : float
-        Of the last frame.
-    n_streams : int
-    history : deque of LivePhase
-        The phases of the last 100,000 frames.
+    The first frame, (n_features,) or (n_streams, n_features), is still to be taken by ``step``.
+    ``time`` is its time, in frames of the training trials, and later that of the last frame.
+    ``history`` has the phases of the last 100,000 frames.
     """
 
     def __init__(self, reference, frame, time):
@@ -141,14 +129,7 @@ class Session:
 class Course:
     """When streams began their cycles, or attempts, and when these will end.
 
-    Parameters
-    ----------
-    n_frames : int
-        P, the length of the clock.
-    duration : float
-        Mean duration of a trial, in the unit of times.
-    cyclic : bool
-    n_streams : int, default=1
+    The clock has ``n_frames``, and a trial the mean ``duration``, in the unit of times.
     """
 
     def __init__(self, n_frames, duration, cyclic, n_streams=1):
@@ -196,17 +177,7 @@ class Course:
 class Streams:
     """Trials that are matched to a reference at the same samples.
 
-    Parameters
-    ----------
-    reference : Reference
-    n_streams : int
-    n_features : int
-
-    Attributes
-    ----------
-    trellis : CausalTrellis
-    mean_cost : ndarray, shape (n_streams,)
-        Of a sample, over the last tenth of the clock.
+    ``mean_cost`` (n_streams,) is that of a sample, over the last tenth of the clock.
     """
 
     def __init__(self, reference, n_streams, n_features):
@@ -346,21 +317,9 @@ class Streams:
 class Resampler:
     """Interpolates the frames of streams at even times, from the first frame on.
 
-    Parameters
-    ----------
-    step : float
-        Time between two samples, in frames of the training trials.
-    n_frames : int
-        Samples of a trial of mean duration.
-    frame : ndarray, shape (n_streams, n_features)
-        The first frame.
-    time : float
-        Its time.
-
-    Attributes
-    ----------
-    elapsed : float
-        Time from the last sample to the last frame, in steps, below 1.
+    Two samples are a ``step`` apart, in frames of the training trials, and a trial of mean duration
+    has ``n_frames`` samples. ``frame`` (n_streams, n_features) is the first one, and ``time`` its
+    time. ``elapsed`` is the time from the last sample to the last frame, in steps, below 1.
     """
 
     def __init__(self, step, n_frames, frame, time):
@@ -419,24 +378,9 @@ def window_length(n_frames):
 def go_round(before, now, cycles, last, tolerance):
     """Go on from phases to the next ones by the shorter way round the cycle.
 
-    A phase that goes back over the beginning of a cycle by the tolerance at most stays there, so
-    that no cycle begins twice.
-
-    Parameters
-    ----------
-    before, now : ndarray, shape (n_streams,)
-        Phases from 0 to ``last``.
-    cycles : ndarray of int, shape (n_streams,)
-        Numbers of the cycles before.
-    last : int
-        P - 1.
-    tolerance : float
-
-    Returns
-    -------
-    phases : ndarray, shape (n_streams,)
-    turns : ndarray of int, shape (n_streams,)
-        1 where a cycle begins, -1 where one is taken back.
+    Phases (n_streams,) are from 0 to ``last``, P - 1. The results are the next ones and the turns:
+    1 where a cycle begins, -1 where one is taken back. A phase that goes back over the beginning of
+    a cycle by the tolerance at most stays there, so that no cycle begins twice.
     """
     turns = np.round((before - now) / last).astype(np.intp)
     stays = (turns < 0) & (now >= last - tolerance) & (cycles > 0)
@@ -467,22 +411,11 @@ def phase_probabilities(gains, temperature):
 
 
 def phase_bounds(gains, temperature, phase, last):
-    """Bounds between which phases lie with a probability of 90 %.
+    """Bounds (2, n) between which phases lie with a probability of 90 %.
 
-    Parameters
-    ----------
-    gains : ndarray, shape (n, n_frames)
-        The `gains_of` costs, at whole frames, and at those after the end of the movement.
-    temperature : ndarray, shape (n,)
-        Gains over it are log-probabilities.
-    phase : ndarray, shape (n,)
-        The estimated phases, which are between the bounds.
-    last : int
-        P - 1.
-
-    Returns
-    -------
-    ndarray, shape (2, n)
+    The `gains_of` costs (n, n_frames) are those at whole frames up to ``last``, P - 1, and after
+    the end of the movement; over the temperature (n,) they are log-probabilities. The estimated
+    phases (n,) are between the bounds.
     """
     bounds = _bounds_of(_weights(gains, temperature), 0, phase, last)
     return np.clip(bounds, 0, last)
@@ -515,29 +448,11 @@ def _bounds_of(weights, first, phase, last):
 
 
 def check_observations(x, what, names, width, ndims=(1,)) -> np.ndarray:
-    """The numbers of a frame or of a take, checked.
+    """The numbers of a frame or of a take, checked; NaN is not seen.
 
-    Parameters
-    ----------
-    x : array-like, DataFrame or Series
-        NaN is not seen.
-    what : str
-        What to call it in messages.
-    names : list or None
-        Names of the features that a table must have.
-    width : int
-        Number of features.
-    ndims : tuple of int, default=(1,)
-        Accepted numbers of dimensions: 1 is a frame, 2 several frames.
-
-    Returns
-    -------
-    ndarray of float64
-
-    Raises
-    ------
-    ValueError
-        If it has another shape or other names, is empty or infinite.
+    ``names`` are those that a table must have, and ``width`` is the number of features. Of the
+    accepted numbers of dimensions 1 is a frame, and 2 are several frames. A ValueError, about
+    ``what``, refuses another shape, other names, and what is empty or infinite.
     """
     # A row of a table has the names of its columns.
     check_names(x.to_frame().T if isinstance(x, pd.Series) else x, names, what)
@@ -557,35 +472,14 @@ def check_observations(x, what, names, width, ndims=(1,)) -> np.ndarray:
 def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
     """The times of frames, checked, in frames of the training trials.
 
-    Parameters
-    ----------
-    times : float, array-like of shape (n_frames,), or None
-        In seconds if there is a frame rate, else in frames of the training trials. None: one
-        frame of these follows another, the first at 0.
-    n_frames : int
-    frame_rate : float, default=None
-        Frames a second of the training trials.
-    what : str
-        What to call the sequence in messages.
-    after : float, default=None
-        Time of the frame before these, in frames of the training trials.
+    They are given in seconds if there is a frame rate, else in frames of the training trials; None
+    is one frame of these after another, the first at 0, or behind the time ``after`` of the frame
+    before.
 
-    Returns
-    -------
-    ndarray of float64, shape (n_frames,)
-        Increasing.
-
-    Raises
-    ------
-    ValueError
-        If there is not one time a frame, or times are not finite, or do not increase, by 1e-9 to
-        1e9 frames.
-
-    Warns
-    -----
-    UserWarning
-        If frames are more than 24 frames of the training trials apart, or less than 1/24, in
-        the median: times in milliseconds where seconds are meant.
+    A ValueError, about ``what``, refuses times that are not one a frame, not finite, or do not
+    increase by 1e-9 to 1e9 frames. A UserWarning tells of frames that are more than 24 frames of
+    the training trials apart, or less than 1/24, in the median: times in milliseconds where seconds
+    are meant.
     """
     if times is None:
         return np.arange(n_frames) + (0.0 if after is None else after + 1)

@@ -497,13 +497,7 @@ class Reference:
 
 
 class FeatureSubset:
-    """Some of the features of a `Reference`.
-
-    Attributes
-    ----------
-    moving : ndarray, shape (Q, n_compared)
-        Those of the mean trial.
-    """
+    """Some of the features of a `Reference`; ``moving`` (Q, n_compared) are those of its mean."""
 
     def __init__(self, reference, columns, metric, velocity, poses):
         self._cost, self._centre = reference.cost, reference.centre
@@ -546,26 +540,13 @@ _DEFAULT_INTERVAL = 8.0
 
 
 def calibrate(reference_of, trials, warped, times, progress):
-    """Learn the temperatures and the typical cost of a `Reference`.
+    """Learn the temperature, the typical cost and the interval temperature of a `Reference`.
 
-    Each training trial is matched to the mean of the others. The temperature maximises the
-    likelihood of the phases of the synchronizer. That of the intervals is the lowest at which nine
-    tenths of these phases are inside, raised for new people.
-
-    Parameters
-    ----------
-    reference_of : callable
-        The `Reference` of a mean trial (P, n_features).
-    trials : list of ndarray (n_frames_i, n_features)
-    warped : ndarray, shape (n_sequences, P, n_features)
-        The synchronised trials.
-    times : ndarray, shape (n_sequences, P)
-        ``tau`` of each.
-    progress : Progress
-
-    Returns
-    -------
-    temperature, typical_cost, interval_temperature : float
+    Each training trial is matched to the mean of the others, of which ``reference_of`` makes a
+    `Reference`. The temperature maximises the likelihood of the phases of the synchronizer,
+    ``times`` (n_sequences, P). That of the intervals is the lowest at which nine tenths of these
+    phases are inside, raised for new people. ``warped`` (n_sequences, P, n_features) are the
+    synchronised trials.
     """
     n, total = len(trials), warped.sum(axis=0, dtype=np.float64)
     chosen = np.unique(np.linspace(0, n - 1, _MAX_TRIALS).round().astype(np.intp))

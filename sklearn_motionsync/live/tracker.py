@@ -417,14 +417,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
 
 
 class Observer(NamedTuple):
-    """``y = matrix @ pose + noise``.
-
-    Parameters
-    ----------
-    matrix : ndarray, shape (n_observed, n_features)
-    noise : ndarray, shape (n_observed, n_observed)
-        Covariance of the noise.
-    """
+    """An observation ``y = matrix @ pose + noise``: its matrix, and the covariance of the noise."""
 
     matrix: np.ndarray
     noise: np.ndarray
@@ -437,21 +430,9 @@ class Observer(NamedTuple):
 def check_projection(projection, n_features):
     """The observation matrix (n_observed, n_features) and its offset (n_observed,), checked.
 
-    Parameters
-    ----------
-    projection : array-like, pair of two of them, or None
-        A matrix; or it and the offset; None is the identity.
-    n_features : int
-
-    Returns
-    -------
-    matrix, offset : ndarray
-
-    Raises
-    ------
-    ValueError
-        If the matrix is not of this width, or anything is not finite or above 1e9, or there is not
-        one offset for each of its rows.
+    A projection is a matrix, the pair of it and the offset, or None, the identity. A ValueError
+    refuses a matrix of another width, what is not finite or above 1e9, and another number of
+    offsets than rows.
     """
     if projection is None:
         return np.eye(n_features), np.zeros(n_features)
