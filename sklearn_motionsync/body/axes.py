@@ -56,17 +56,10 @@ def from_y_up(points, skeleton):
 
 
 def heading_axes(left):
-    """Axes of bodies: x horizontal to the left, y up, z forward.
+    """Axes (n_frames, 3, 3) of bodies, one a row: x horizontal to the left, y up, z forward.
 
-    Parameters
-    ----------
-    left : ndarray, shape (n_frames, 3)
-        Unit vectors along the hips, or along the shoulders, to the left.
-
-    Returns
-    -------
-    ndarray, shape (n_frames, 3, 3)
-        One axis a row. Those of the recording where the direction is vertical.
+    ``left`` (n_frames, 3) are unit vectors along the hips, or along the shoulders, to the left.
+    Where they are vertical, the axes are those of the recording.
     """
     x = left * np.array([1, 0, 1], dtype=left.dtype)
     length = np.linalg.norm(x, axis=1, keepdims=True)
@@ -79,20 +72,10 @@ def heading_axes(left):
 def fill_heading(hips, shoulders=None):
     """Directions to the left for `heading_axes`, where those of the hips are NaN in some frames.
 
-    No frame uses a later one. Where the hips are hidden, the shoulders give the heading, corrected
-    by the angle between both when they were last seen together; before that, by none. Where both
-    are hidden, the last heading stays.
-
-    Parameters
-    ----------
-    hips : ndarray, shape (n_frames, 3)
-        Directions to the left.
-    shoulders : ndarray, shape (n_frames, 3), default=None
-
-    Returns
-    -------
-    ndarray, shape (n_frames, 3)
-        NaN before the first frame that shows a heading.
+    Directions are (n_frames, 3). No frame uses a later one. Where the hips are hidden, the
+    shoulders give the heading, corrected by the angle between both when they were last seen
+    together; before that, by none. Where both are hidden, the last heading stays; before the first
+    frame that shows a heading the result is NaN.
     """
     angles = _horizontal(hips)
     if shoulders is not None:

@@ -42,37 +42,19 @@ _MIDPOINTS = {"hip": "pelvis", "shoulder": "neck"}
 
 
 def blend_numbers(arrays, frames, weights):
-    """Weighted sums of sequences at given frames.
+    """Weighted sums (n_frames, ...) of sequences (n_frames_i, ...) at given frames.
 
-    Parameters
-    ----------
-    arrays : list of ndarray (n_frames_i, ...)
-    frames : ndarray, shape (n, n_frames)
-        The frames of each sequence that correspond, with fractions.
-    weights : ndarray, shape (n, n_frames)
-        Of sum 1 along the first axis.
-
-    Returns
-    -------
-    ndarray, shape (n_frames, ...)
+    The frames (n, n_frames) of each sequence correspond, with fractions, and the weights of that
+    shape have the sum 1 along the first axis.
     """
     pairs = zip(arrays, frames, weights, strict=True)
     return sum((at_times(x, f).T * w).T for x, f, w in pairs)
 
 
 def blend_bodies(arrays, frames, weights, skeleton):
-    """Blends of joint positions, in space with feet that stand.
+    """Blends of joint positions (n_frames_i, n_dims * n_joints), in space with feet that stand.
 
-    Parameters
-    ----------
-    arrays : list of ndarray (n_frames_i, n_dims * n_joints)
-        Checked, of one unit.
-    frames, weights : as for `blend_numbers`
-    skeleton : Skeleton
-
-    Returns
-    -------
-    ndarray, shape (n_frames, n_dims * n_joints)
+    They are checked and of one unit; frames and weights are those of `blend_numbers`.
     """
     structure = LinkStructure(skeleton)
     figures = [structure.decompose(x) for x in arrays]
@@ -462,20 +444,10 @@ class Leg(NamedTuple):
 
 
 def find_stances(points, legs, size):
-    """How much the soles of a recording stand, between frames.
+    """How much the soles of a recording stand between frames, from 0 to 1: (n_soles, n_frames - 1).
 
-    Parameters
-    ----------
-    points : ndarray, shape (n_frames, n_points, 3)
-        y up.
-    legs : list of Leg
-    size : float
-        The unit of length of the body.
-
-    Returns
-    -------
-    ndarray, shape (n_soles, n_frames - 1)
-        From 0 to 1, for the soles of one leg after the other.
+    The points (n_frames, n_points, 3) are y up, and ``size`` is the unit of length of the body. The
+    soles are those of one leg after the other.
     """
     soles = [p for leg in legs for p in leg.soles]
     heights = (points[1:, soles, 1] + points[:-1, soles, 1]).T / 2

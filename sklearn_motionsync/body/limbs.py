@@ -179,20 +179,10 @@ def unit_vectors(vectors):
 
 
 def features_of_parts(limbs, n_dims, first):
-    """Indices of the features of each part.
+    """Indices of the features of each part, by its name.
 
-    Parameters
-    ----------
-    limbs : list of str
-        The limbs in the order of their cosines.
-    n_dims : int
-        Cosines of a limb.
-    first : int
-        Index of the first cosine.
-
-    Returns
-    -------
-    dict of str to list of int
+    The limbs are in the order of their cosines, of which each has ``n_dims``, and ``first`` is the
+    index of the first cosine.
     """
     limb_of = [None] * first + [limb for limb in limbs for _ in range(n_dims)]
     return _by_part(limb_of)

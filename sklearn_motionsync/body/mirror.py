@@ -228,19 +228,10 @@ def _check_middle(arrays, skeleton, alone):
 def exchange_of_sides(names, limbs=None):
     """The columns and signs that make the mirror image of poses from direction cosines.
 
-    Parameters
-    ----------
-    names : list of str
-        Of the features. Those that are no cosine ``<limb>_<axis>`` stay.
-    limbs : list of str, default=None
-        Limbs of which left and right are exchanged; the others stay. By default the whole body is
-        mirrored: hip line and shoulder line, and the middle, too.
-
-    Returns
-    -------
-    columns : ndarray of int, signs : ndarray
-        The image is ``signs * poses[..., columns]``. None if a limb lacks its counterpart, or
-        there is no left and right.
+    The image is ``signs * poses[..., columns]``; None if a limb lacks its counterpart, or there is
+    no left and right. Features whose names are no cosine ``<limb>_<axis>`` stay. If limbs are
+    given, only their left and right are exchanged; by default the whole body is mirrored: hip line
+    and shoulder line, and the middle, too.
     """
     names = [str(name) for name in names]
     columns, signs, has_sides = np.arange(len(names)), np.ones(len(names)), False

@@ -71,18 +71,10 @@ def mean_direction(directions, weights):
 
 
 def mean_vector(vectors, weights):
-    """The weighted mean direction of vectors, times their weighted mean length.
+    """The weighted mean direction (..., d) of vectors, times their weighted mean length.
 
-    Parameters
-    ----------
-    vectors : ndarray, shape (n, ..., d)
-        Of a length above 0.
-    weights : ndarray, shape (n, ...)
-        Broadcast to the vectors; of sum 1 along the first axis.
-
-    Returns
-    -------
-    ndarray, shape (..., d)
+    The vectors (n, ..., d) have a length above 0, and the weights (n, ...), which are broadcast to
+    them, the sum 1 along the first axis.
     """
     lengths = mean_length(np.linalg.norm(vectors, axis=-1), weights)
     return mean_direction(unit_vectors(vectors), weights) * lengths[..., np.newaxis]

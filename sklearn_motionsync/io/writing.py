@@ -372,14 +372,8 @@ def add_middles(joints, parents, points):
 def make_rig(joints, parents, points):
     """A rig of a body that has none: at rest it is as in its first frame.
 
-    Children of one joint turn by themselves: each hangs on a joint of its own in the same place,
-    ``<child>_pivot``.
-
-    Parameters
-    ----------
-    joints : list of str
-    parents : list of int
-    points : ndarray, shape (n_frames, n_joints, 3)
+    Points are (n_frames, n_joints, 3). Children of one joint turn by themselves: each hangs on a
+    joint of its own in the same place, ``<child>_pivot``.
     """
     turns = ["Zrotation", "Xrotation", "Yrotation"]
     moves = ["Xposition", "Yposition", "Zposition"]
@@ -403,24 +397,12 @@ def make_rig(joints, parents, points):
 
 
 def solve_rig(rig, points):
-    """The channels of a rig at positions.
+    """The channels (n_frames, n_channels) of a rig at positions, in their unit and in degrees.
 
     Every joint turns as far as it must for its children to lie in their directions, by least
     squares where there are several. Bones keep their length: that of the rig, or the median of the
-    positions if it differs.
-
-    Parameters
-    ----------
-    rig : Rig
-    points : ndarray, shape (n_frames, n_joints, 3)
-        Positions of its joints, y up; NaN of an end site that is not known.
-
-    Returns
-    -------
-    channels : ndarray, shape (n_frames, n_channels)
-        Positions, and degrees.
-    offsets : ndarray, shape (n_joints, 3)
-        Those of the rig, with the lengths of the body.
+    positions if it differs. The offsets (n_joints, 3) with these lengths are returned, too. The
+    positions (n_frames, n_joints, 3) are y up, and NaN of an end site that is not known.
     """
     n_frames, n_joints = points.shape[:2]
     offsets = _fit_lengths(rig, points)

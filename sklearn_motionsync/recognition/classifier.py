@@ -452,17 +452,9 @@ class ActionClassifier(
 def choose_landmarks(codes, groups, n_landmarks):
     """Trials of all classes, and of all groups of each, in numbers as even as possible.
 
-    Parameters
-    ----------
-    codes : ndarray of int, shape (n,)
-        Classes.
-    groups : ndarray of int, shape (n,), or None
-    n_landmarks : int or None
-
-    Returns
-    -------
-    ndarray of int
-        Indices, rising; all, if there are at most twice as many.
+    Classes and groups (n,) are counted from 0; groups may be None. The results are indices, rising:
+    those of all trials if these are at most twice as many as landmarks, or if there is no number of
+    landmarks.
     """
     n = len(codes)
     if n_landmarks is None or n <= 2 * n_landmarks:

@@ -183,22 +183,10 @@ def normalise_time(trials, n_frames):
 
 
 def pairwise_distances(comparison, X, Y=None, *, symmetric=True, n_jobs=None, progress, name=""):
-    """Distances between trials, given the features that are compared.
+    """Distances (n_X, n_Y) between trials, given the features (n, P, n_features) that are compared.
 
-    Parameters
-    ----------
-    comparison : PairwiseDistance
-    X, Y : ndarray, shape (n, P, n_features)
-        Without Y, within X.
-    symmetric : bool, default=True
-    n_jobs : int, default=None
-    progress : Progress
-    name : str, default=""
-        Appended to the message of the progress.
-
-    Returns
-    -------
-    ndarray, shape (n_X, n_Y)
+    Without Y they are those within X, and symmetric ones are means of both directions. The name is
+    appended to the message of the progress.
     """
     directed = partial(_directed, comparison, n_jobs=n_jobs, progress=progress, name=name)
     there = directed(X, X if Y is None else Y)
@@ -289,17 +277,7 @@ class PairwiseDistance:
         return np.concatenate([features, residue], axis=2, dtype=self.dtype)
 
     def block(self, bases, moving):
-        """Distances of bases to moving sequences, not symmetric.
-
-        Parameters
-        ----------
-        bases, moving : ndarray, shape (n, P, n_features)
-            Features.
-
-        Returns
-        -------
-        ndarray, shape (n_bases, n_moving)
-        """
+        """Distances (n_bases, n_moving) of the features of bases to moving sequences."""
         distances = PairTile(self.trellis, bases, moving).ends()[:, :, 0]
         energies = _energies(bases)[:, np.newaxis] + _energies(moving)
         return np.where(distances <= EQUAL[distances.dtype] * energies, 0, distances)
@@ -312,13 +290,7 @@ def _energies(features):
 
 
 class PairTile(Tile):
-    """A tile that multiplies every pair by itself.
-
-    Parameters
-    ----------
-    trellis : Trellis
-    bases, moving : ndarray, shape (n, P, n_features)
-    """
+    """A tile that multiplies every pair of sequences (n, P, n_features) by itself."""
 
     def __init__(self, trellis, bases, moving):
         super().__init__(Bases(trellis, bases), right_factor(moving, trellis))

@@ -79,19 +79,8 @@ class MotionKernel:
     def fit(self, trials, landmarks, codes, groups=None, **jobs):
         """Estimate units, medians and weights from the training set, and return its kernel.
 
-        Parameters
-        ----------
-        trials : sequence of ndarray (n_frames_i, n_features)
-        landmarks : ndarray of int, shape (n_landmarks,)
-        codes : ndarray of int, shape (n,)
-            Classes.
-        groups : ndarray of int, shape (n,), default=None
-        **jobs : dict
-            ``n_jobs`` and ``progress``.
-
-        Returns
-        -------
-        ndarray, shape (n, n), or (n, n_views * n_landmarks)
+        Landmarks are indices of trials, and classes and groups (n,) are counted from 0. ``jobs``
+        are ``n_jobs`` and ``progress``. The kernel is (n, n), or (n, n_views * n_landmarks).
         """
         frames = [x.astype(np.float64, copy=False) for x in trials]
         self._center = np.concatenate(frames).mean(axis=0)
@@ -187,22 +176,12 @@ class MotionKernel:
 
 
 def align_weights(views, codes, groups, landmarks):
-    """Weights of kernels, the larger the better these tell classes across groups.
+    """Weights (n_views,) of kernels, the larger the better these tell classes across groups.
 
-    They are powers of the alignment of a kernel with the classes: of the correlation, over pairs of
-    different groups, of the kernel and of whether a pair is of one class, both centred by row and
-    by column. Kernels that are not aligned have no weight; if none is, all have the same.
-
-    Parameters
-    ----------
-    views : ndarray, shape (n_views, n, n_landmarks)
-    codes, groups : ndarray of int, shape (n,)
-    landmarks : ndarray of int, shape (n_landmarks,)
-
-    Returns
-    -------
-    ndarray, shape (n_views,)
-        They sum to 1.
+    They are powers of the alignment of a kernel (n, n_landmarks) with the classes: of the
+    correlation, over pairs of different groups, of the kernel and of whether a pair is of one
+    class, both centred by row and by column. They sum to 1. Kernels that are not aligned have no
+    weight; if none is, all have the same.
     """
     is_pair = groups[:, np.newaxis] != groups[landmarks]
     same = _centred(codes[:, np.newaxis] == codes[landmarks])[is_pair]
@@ -257,16 +236,8 @@ def change_extremes(changes):
 def change_shares(changes, units):
     """For how much of the clock changes exceed levels, of every feature, reach and level.
 
-    A frame counts ``tanh`` of its excess, from -1 to 1, so that no count jumps with rounding.
-
-    Parameters
-    ----------
-    changes : ndarray, shape (n_reaches, P, n_features)
-    units : ndarray, shape (n_reaches, n_features)
-
-    Returns
-    -------
-    ndarray, shape (n_levels * n_reaches * n_features,)
+    The changes (n_reaches, P, n_features) are compared in units (n_reaches, n_features). A frame
+    counts ``tanh`` of its excess, from -1 to 1, so that no count jumps with rounding.
     """
     levels = _LEVELS[:, np.newaxis, np.newaxis, np.newaxis]
     excess = (changes / units[:, np.newaxis] - levels) / _SOFTNESS
@@ -316,17 +287,9 @@ class KernelRegression:
     def fit(self, codes, chosen=None):
         """Fit to the classes (n,), integers from 0, of some trials.
 
-        Parameters
-        ----------
-        codes : ndarray of int, shape (n,)
-        chosen : ndarray of bool, shape (n,), default=None
-            Which trials; the others are no landmarks, either. None: all.
-
-        Returns
-        -------
-        A : ndarray, shape (n_kernels * n_landmarks, n_classes)
-        b : ndarray, shape (n_classes,)
-            Minus infinity for classes that none of them has.
+        They have the mask ``chosen``, by default all; the others are no landmarks, either. Returns
+        ``A`` (n_kernels * n_landmarks, n_classes), and ``b`` (n_classes,), which is minus infinity
+        for classes that none of them has.
         """
         n_classes = codes.max() + 1
         chosen = np.ones(len(codes), dtype=bool) if chosen is None else chosen
@@ -401,15 +364,7 @@ def held_out_decisions(regression, kernel, codes, folds):
 def fit_temperature(decisions, codes):
     """The factor of decision values with the largest posterior density (temperature scaling).
 
-    Parameters
-    ----------
-    decisions : ndarray, shape (n, n_classes)
-        Of held-out trials, as `held_out_decisions` returns them.
-    codes : ndarray of int, shape (n,)
-
-    Returns
-    -------
-    float
+    The decisions (n, n_classes) are those of held-out trials, of `held_out_decisions`.
     """
     known = np.isfinite(decisions[np.arange(len(codes)), codes])
     decisions, codes = decisions[known], codes[known]
@@ -426,22 +381,11 @@ def fit_temperature(decisions, codes):
 def fold_gain(regression, kernel, codes, folds, decisions):
     """What the largest decision value of a trial gains from one more fold, in the median.
 
-    Held-out values come from all folds but one, those of new trials from all ``G`` of them.
-    Fits without two neighbouring folds tell what the last but one brings. The error of a fit falls
-    with the inverse of what it learns from, so the last fold brings ``(G - 2) / G`` of that.
-
-    Parameters
-    ----------
-    regression : KernelRegression
-    kernel : ndarray, shape (n, n_kernels * n_landmarks)
-    codes, folds : ndarray of int, shape (n,)
-    decisions : ndarray, shape (n, n_classes)
-        As `held_out_decisions` returns them.
-
-    Returns
-    -------
-    float
-        0 with two folds, or if no fit without two of them knows two classes.
+    Held-out values, the decisions of `held_out_decisions`, come from all folds but one, those of
+    new trials from all ``G`` of them. Fits without two neighbouring folds tell what the last but
+    one brings. The error of a fit falls with the inverse of what it learns from, so the last fold
+    brings ``(G - 2) / G`` of that. It is 0 with two folds, or if no fit without two of them knows
+    two classes.
     """
     numbers = np.unique(folds)
     right = first_largest(decisions, axis=1) == codes

@@ -562,10 +562,7 @@ def compared_names(segmenter):
 def start_curves(segmenter, X, features):
     """Curves of takes; a cycle begins at the maximum of the one with the largest maximum.
 
-    Returns
-    -------
-    dict of str to list of ndarray (n_frames_i,)
-        By name; None where any feature will do.
+    They are lists by name, with one curve (n_frames_i,) a take; None where any feature will do.
     """
     start, skeleton = segmenter.start, segmenter.skeleton
     has_feet = _has_feet(skeleton)

@@ -228,21 +228,10 @@ def _search_takes(takes, propose, dissimilarity, threshold, coverage, progress):
 
 
 def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
-    """Takes at the frame rate of the training set.
+    """Takes at the frame rate of the training set, ``X`` itself if none is resampled.
 
-    Parameters
-    ----------
-    pattern, frame_rate, pattern_rate : as for `find_trials`
-    X, checked : the takes, and the same, checked
-
-    Returns
-    -------
-    takes : collection
-        ``X``, if none is resampled.
-    paces : list of float
-        For each, the frames that were given in a frame that is searched.
-    known : bool
-        Whether any frame rate is known.
+    With the takes come the frames that were given in a frame that is searched, for each, and
+    whether any frame rate is known. ``checked`` are the takes of ``X``, checked.
     """
     rates = [facts.get("frame_rate") for facts in checked.facts] or [None] * len(checked)
     if frame_rate is not None:
@@ -333,14 +322,8 @@ def _resample(x, array, pace, rate):
 def in_frames_given(hits, pace, n_frames):
     """Hits in a resampled take, in order of time, in the frames of the take as it was given.
 
-    Parameters
-    ----------
-    hits : list of (int, int, float)
-        Start, stop and score.
-    pace : float
-        The frames that were given in a frame that was searched.
-    n_frames : int
-        Of the take that was given.
+    A hit has a start, a stop and a score. ``pace`` is the number of frames that were given in a
+    frame that was searched, and ``n_frames`` that of the take that was given.
     """
     if pace == 1 or not hits:
         return hits
@@ -358,12 +341,7 @@ def in_frames_given(hits, pace, n_frames):
 class Hit(NamedTuple):
     """A window of a take whose ends were moved to where its score is best.
 
-    Attributes
-    ----------
-    start, stop : int
-    score : float
-    proposed : float
-        The score before its ends were moved.
+    ``proposed`` is the score before its ends were moved.
     """
 
     start: int

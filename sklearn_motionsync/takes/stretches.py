@@ -87,25 +87,13 @@ class Repeats(NamedTuple):
 
 
 def find_repeats(x, threshold, limits=None):
-    """Stretches of a take in which its movement repeats.
+    """Stretches of a take (n_frames, n_features) in which its movement repeats, as `Repeats`.
 
     Every lag proposes the interval whose frames repeat best one lag later. The proposal that
     explains most movement, times the number of its periods, is tried first: the self-correlation
-    gives its period, its ends are found again at this period, and it is judged. The parts before
-    and behind an accepted stretch are searched in the same way.
-
-    Parameters
-    ----------
-    x : ndarray, shape (n_frames, n_features)
-        Features of a take.
-    threshold : float
-        The self-correlation that is required.
-    limits : (float, float), default=None
-        The least and the largest number of frames of a period.
-
-    Returns
-    -------
-    Repeats
+    gives its period, its ends are found again at this period, and it is judged by the threshold of
+    the self-correlation. The parts before and behind an accepted stretch are searched in the same
+    way. ``limits`` are the least and the largest number of frames of a period.
     """
     take, stretches, open_parts = _Take(x, limits), [], [(0, len(x))]
     while open_parts:
@@ -252,15 +240,8 @@ class _Take:
 class _Group:
     """Lags that are compared under one filter.
 
-    Parameters
-    ----------
-    samples : ndarray, shape (n_samples, n_features)
-        Every ``step``-th frame of a take.
-    step : int
-    lags : ndarray of int
-        In samples.
-    noise : float
-        Variance of white noise in a sample.
+    ``samples`` (n_samples, n_features) are every ``step``-th frame of a take, lags count samples,
+    and ``noise`` is the variance of white noise in a sample.
     """
 
     def __init__(self, samples, step, lags, noise):
@@ -483,14 +464,9 @@ def circular_peak(curve):
 
 
 def move_to_events(times, phases, events):
-    """Phases that are whole numbers at events which are near such phases.
+    """Phases (n_samples,) that are whole numbers at events which are near such phases.
 
-    Parameters
-    ----------
-    times, phases : ndarray, shape (n_samples,)
-        Of a stretch.
-    events : ndarray
-        The times at which cycles begin, as far as they are known.
+    The events are the times at which cycles begin, as far as they are known.
     """
     inside = events[(events >= times[0]) & (events <= times[-1])]
     at = np.interp(inside, times, phases)

@@ -72,7 +72,11 @@ class WindowDissimilarity:
 
     def __init__(self, synchronizer, groups=None):
         lengths, examples = synchronizer.lengths_, synchronizer.examples_
-        self._set_clock(synchronizer.features_, synchronizer.n_frames_)
+        n_frames = synchronizer.n_frames_
+        self._n_positions = min(n_frames, _MAX_POSITIONS)
+        # The features at the pace of so many positions.
+        pace = (self._n_positions - 1) / (n_frames - 1)
+        self._features = synchronizer.features_.replace(pace=pace)
         self._length = LogMoments.of(lengths).standardize
         self._typical_length = np.exp(np.log(lengths).mean())
         count = len(examples)
@@ -107,22 +111,10 @@ class WindowDissimilarity:
 
             Phi(z(1.5 T)) - (0.02 #{u < T} + 0.1 sum exp(-log(u / T)^2 / (2 * 0.05^2))) / n
 
-        with standard scores z of logarithms among training trials. So it rejects what many
-        windows are as similar as, and lies in a gap where there is one. n is 1, and grows with
-        takes beyond 45 typical lengths.
-
-        Parameters
-        ----------
-        limit : float
-            As of ``threshold``.
-        hits : ndarray (n_hits,)
-            Dissimilarities u of the windows of the take that do not overlap.
-        n_frames : int
-            Of the take.
-
-        Returns
-        -------
-        float
+        with the dissimilarities u (n_hits,) of the windows of the take that do not overlap, and
+        standard scores z of logarithms among training trials. So it rejects what many windows are
+        as similar as, and lies in a gap where there is one. n is 1, and grows with takes beyond 45
+        typical lengths. The limit is that of ``threshold``.
         """
         if not len(self.known):
             return limit
@@ -143,11 +135,6 @@ class WindowDissimilarity:
             positions = self._positions([take[start:stop] for start, stop in windows[rows]])
             out[rows] = self._measure(positions, windows[rows, 1] - windows[rows, 0])
         return out
-
-    def _set_clock(self, features, n_frames):
-        """The number of positions of a window, and the features at this pace."""
-        self._n_positions = min(n_frames, _MAX_POSITIONS)
-        self._features = features.replace(pace=(self._n_positions - 1) / (n_frames - 1))
 
     def _random_limit(self):
         """A low quantile of the dissimilarity of random movements."""
@@ -178,16 +165,8 @@ class WindowDissimilarity:
 def random_movements(positions, counts):
     """Movements with the mean and the covariance of poses, smooth as those of people.
 
-    Parameters
-    ----------
-    positions : ndarray, shape (n_sequences, Q, n_features)
-        Trials on the clock.
-    counts : iterable of int
-        How many at a time; always the same ones for the same ``counts``.
-
-    Yields
-    ------
-    ndarray, shape (count, Q, n_features)
+    The trials (n_sequences, Q, n_features) are on the clock. Yields (count, Q, n_features) for each
+    of the counts; always the same movements for the same counts.
     """
     _, n_positions, n_features = positions.shape
     poses = positions.reshape(-1, n_features)
