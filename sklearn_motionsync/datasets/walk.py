@@ -191,18 +191,15 @@ def _record(rng, gait, n_strides, style, treadmill, frame_rate):
         feet[side] = _foot(times, at, offs, places, speed)
         moments = [("Foot Strike", t) for t in at] + [("Foot Off", t) for t in offs]
         events += [
-            {"label": label, "context": side.capitalize(), "time": t - begin,
-             "frame": (t - begin) * frame_rate}
+            {"label": label, "context": side.capitalize(), "time": float(t - begin),
+             "frame": float((t - begin) * frame_rate)}
             for label, t in moments if times[0] < t < times[-1]
         ]  # fmt: skip
     joints = _body(times, feet, gait, speed, strikes["right"])
     positions = np.stack([joints[name] for name in _skeleton().joints], axis=1)
     if treadmill:
         positions[..., 2] -= speed * (times - begin)[:, np.newaxis]
-    events = [
-        event | {key: float(event[key]) for key in ("time", "frame")}
-        for event in sorted(events, key=lambda event: event["time"])
-    ]
+    events.sort(key=lambda event: event["time"])
     return positions.reshape(len(times), -1), events
 
 
