@@ -189,9 +189,9 @@ def _plain_numbers(text, n):
     return None
 
 
-def _is_number(word):
+def _is_number(word, below=_LARGEST):
     try:
-        return abs(float(word)) < _LARGEST and b"_" not in word
+        return abs(float(word)) < below and b"_" not in word
     except ValueError:
         return False
 
@@ -255,15 +255,11 @@ def _numbers_or_nan(text, fields):
 def _number_or_nan(text, field):
     if field.strip().lower().lstrip(b"+-") in _MISSING:
         return math.nan
-    try:
-        number = float(field)
-    except ValueError:
-        number = math.inf
-    if math.isinf(number) or b"_" in field:
+    if not _is_number(field, math.inf):
         raise text.error(
             f"a frame needs numbers, or nothing where one is missing, got {quote([field])}."
         )
-    return number
+    return float(field)
 
 
 def _count_decimals(field):
