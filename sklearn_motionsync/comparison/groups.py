@@ -255,6 +255,8 @@ def compare_aligned(
         [curves, offsets, even],
         n_permutations,
         check_random_state(random_state),
+        # Offsets in frames are the same whatever the signals and the unit of time are.
+        by=[study.units(aligned.match.offsets[:, :, np.newaxis])],
         n_jobs=n_jobs,
         progress=Progress(type("compare_groups", (), {})(), verbose),
     )

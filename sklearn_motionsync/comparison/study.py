@@ -499,7 +499,7 @@ class Family:
         return (len(ordered) - below) / len(ordered)
 
 
-def families(design, curves, n_permutations, random_state, *, n_jobs=None, progress):
+def families(design, curves, n_permutations, random_state, *, by=(), n_jobs=None, progress):
     """The families of several sets of curves, under the same permutations.
 
     Parameters
@@ -508,6 +508,8 @@ def families(design, curves, n_permutations, random_state, *, n_jobs=None, progr
     curves : list of ndarray, shape (n_units, P, n_features)
     n_permutations : int
     random_state : RandomState
+    by : list of ndarray, shape (n_units, P, n_features), default=()
+        Values in whose order units are permuted, the last first; by default the first curves.
     n_jobs : int, default=None
     progress : Progress
 
@@ -515,9 +517,7 @@ def families(design, curves, n_permutations, random_state, *, n_jobs=None, progr
     -------
     list of Family
     """
-    # By their values, so that draws depend on neither the order of trials nor names of people.
-    sums = np.array([np.nansum(unit) for unit in curves[0]])
-    order = np.argsort(np.abs(sums) if design.flips else sums, kind="stable")
+    order = _order_of_values([curves[0], *by], design.flips)
     design, curves = design.rearranged(order), [values[order] for values in curves]
     draws = [design.rows, *(design.permuted(random_state) for _ in range(n_permutations))]
     portions = [np.stack(draws[k : k + _BATCH]) for k in range(0, len(draws), _BATCH)]
@@ -528,6 +528,19 @@ def families(design, curves, n_permutations, random_state, *, n_jobs=None, progr
     n = len(portions)
     by_curves = [results[k : k + n] for k in range(0, len(results), n)]
     return [Family(p[0][0], np.concatenate([largest for _, largest in p])) for p in by_curves]
+
+
+def _order_of_values(curves, flips):
+    """The order of units by their values: draws depend on neither trials' order nor people's names.
+
+    The last of several sets of curves counts first.
+    """
+    keys = []
+    for values in curves:
+        weights = np.sin(1.0 + np.arange(values[0].size)).reshape(values[0].shape)
+        sums = np.nansum(weights * values, axis=(1, 2))
+        keys.append(np.abs(sums) if flips else sums)
+    return np.lexsort(keys)
 
 
 def _enhanced_draws(design, rows, units):

@@ -38,7 +38,7 @@ class Keyframes:
         self._labels, self._name, self._anywhere = None, name, anywhere
         if isinstance(keyframes, (pd.DataFrame, pd.Series)):
             # One row a trial; iterating would give columns.
-            if not isinstance(keyframes.index, pd.RangeIndex):
+            if not keyframes.index.equals(pd.RangeIndex(len(keyframes))):
                 self._labels = keyframes.index.to_list()
             keyframes = keyframes.to_numpy()
         self._count = n_sequences
@@ -61,10 +61,7 @@ class Keyframes:
         count : int, default=None
             Key-frames of each; by default as many as the first has.
         """
-        numbers = range(self._count)
-        if len(trials) < self._count:
-            numbers = trials.numbers
-        rows = self._rows_of([trials.labels[i] for i in range(len(trials))], numbers)
+        numbers, rows = self._numbers(trials), self.in_order(trials)
         if count is None:
             counts = [np.size(row) for row in self._rows if row is not None]
             count = counts[0] if counts else 0
@@ -73,6 +70,13 @@ class Keyframes:
             if row is not None:
                 shares[:] = self._checked(row, i, len(x), count)
         return out
+
+    def in_order(self, trials):
+        """The rows of trials, as they were given."""
+        return self._rows_of([trials.labels[i] for i in range(len(trials))], self._numbers(trials))
+
+    def _numbers(self, trials):
+        return trials.numbers if len(trials) < self._count else range(self._count)
 
     def known(self, trials):
         """Key-frames of a training set as from `shares`, each of them known in some trial."""

@@ -7,6 +7,7 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from sklearn import get_config
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
@@ -251,7 +252,7 @@ def known_keyframes(trials, params):
     keyframes = Keyframes(params["keyframes"], len(trials), params.get("frame_rate"))
     shares = keyframes.shares(trials)
     is_known = np.isfinite(shares).any(axis=0)
-    if is_known.all():
+    if is_known.all() and not isinstance(params["keyframes"], pd.DataFrame):
         return params
     metadata = {name: params[name] for name in params if name not in ("keyframes", "frame_rate")}
     last = np.array([[len(x) - 1] for x in trials])

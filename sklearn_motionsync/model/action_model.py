@@ -37,7 +37,10 @@ from .variation import (
     simultaneous_factor,
 )
 
-__all__ = ["ActionModel"]
+__all__ = ["KEPT", "ActionModel"]
+
+# Attribute of fitted models: what was learnt of them when departures were first asked for.
+KEPT = "_expected"
 
 # Smallest variance of a density, as a share of the variance of all the data: a deviation in a
 # constant feature is not infinitely improbable.
@@ -586,6 +589,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         return samples[:, :, 0] if self._fitted_on_rows else samples
 
     # -- helpers ------------------------------------------------------------------------------
+
+    def __getstate__(self):
+        return {name: value for name, value in super().__getstate__().items() if name != KEPT}
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

@@ -6,7 +6,6 @@ from contextlib import suppress
 from functools import cached_property, partial
 from numbers import Real
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,7 @@ from ..matching.gaps import fill_with_mean
 from ..matching.warps import at_times
 from ..synchronizers.linear import LinearSynchronizer
 from ..utils.pipelines import find_step, find_synchronizer, flat_steps
-from .action_model import ActionModel
+from .action_model import KEPT, ActionModel
 from .faults import FaultFinder, Part, expected_trial
 from .views import View, limbs_of, models_of_classes, view_of
 
@@ -321,10 +320,6 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     return Judged(view, expected.space, curves, mean, std, scores, faults, usual, rare, far, match)
 
 
-# What was learnt of fitted estimators, as long as their models live.
-_EXPECTED: WeakKeyDictionary = WeakKeyDictionary()
-
-
 class _Expected:
     """What a fitted estimator expects of trials, which is learnt when it is first asked.
 
@@ -379,8 +374,8 @@ class _Expected:
     def of(cls, estimator, features):
         """That of an estimator, which is kept until one of its steps is fitted again."""
         steps = flat_steps(estimator)
-        state = [value for step in steps for value in vars(step).values()]
-        kept = _EXPECTED.setdefault(find_step(estimator, ActionModel)[1], {})
+        state = [v for step in steps for name, v in vars(step).items() if name != KEPT]
+        kept = vars(find_step(estimator, ActionModel)[1]).setdefault(KEPT, {})
         key = repr(features)
         before, expected = kept.get(key, ([], None))
         same = len(before) == len(state) and all(a is b for a, b in zip(before, state, strict=True))

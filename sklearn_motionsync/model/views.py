@@ -298,7 +298,8 @@ class _Route(NamedTuple):
                 points = _through(step, points, params, matches, X)
                 whole = whole if whole is None else matches[-1].warp(whole)
         checked, match = self.model.check_trials(points), matches[0] if matches else None
-        facts = TrialFacts.of(X, None, checked=checked) if match is None else match.facts
+        rate = params.get("frame_rate")
+        facts = TrialFacts.of(X, rate, checked=checked) if match is None else match.facts
         if whole is None:
             return Curves(np.stack(checked), checked, match, facts, self)
         beside = np.stack(as_collection(points))[:, :, len(self.aspace.components_) :]
@@ -313,7 +314,7 @@ def _names(steps, estimator, n_features):
 
 def _through(step, points, params, matches, X):
     """Trials X after a step; if it matches them, it warps them by this match, which is appended."""
-    if not hasattr(step, "match"):
+    if not hasattr(step, "transform_matched"):
         return step.transform(points, **accepted_params(step.transform, params))
     _, synchronizer = find_synchronizer(step)
     trials = synchronizer.check_trials(points)

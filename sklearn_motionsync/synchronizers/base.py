@@ -251,6 +251,9 @@ class Synchronizer(
             check_fill(fill)
         trials = self.check_trials(X)
         check_match(match, len(trials), self.n_frames_, type(self).__name__)
+        # What was hidden in the match is hidden here, too.
+        matched = trials if match.reached is None else match.reached.trials
+        trials = with_confidence(trials, matched.confidence)
         return self._restored(trials, self._warped(trials, match), fill)
 
     def match(self, X: TrialsLike) -> Match:

@@ -139,8 +139,8 @@ def blend_trials(
     match = estimator
     if not isinstance(estimator, Match):
         match = route_to_synchronizer(estimator, X, params, "blend_trials").match()
-    elif params:
-        raise TypeError(f"A Match takes no {sorted(params)}.")
+    elif beside := {name for name, value in params.items() if value is not None} - {"frame_rate"}:
+        raise TypeError(f"A Match takes no {sorted(beside)}.")
     warps = match.frames(list(map(len, arrays)))
     n_frames = warps.shape[1]
     weights = _weights(weights, labels, n_frames, "weights")
@@ -173,8 +173,10 @@ def _skeleton_of(estimator, skeleton):
             f"{type(skeleton).__name__}."
         )
     if isinstance(estimator, Match):
-        return None
-    steps = [each for step in flat_steps(estimator) for each in union_transformers(step)]
+        steps = [] if estimator.reached is None else estimator.reached.steps
+    else:
+        steps = flat_steps(estimator)
+    steps = [each for step in steps for each in union_transformers(step)]
     skeletons = [step.skeleton for step in steps if isinstance(step, PositionsTransformer)]
     return skeletons[0] if skeletons else None
 

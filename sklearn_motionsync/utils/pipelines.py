@@ -2,13 +2,14 @@
 
 import inspect
 from contextlib import contextmanager
+from copy import copy
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from sklearn.compose import ColumnTransformer
-from sklearn.pipeline import FeatureUnion, Pipeline
+from sklearn.pipeline import FeatureUnion, Pipeline, make_pipeline
 from sklearn.utils import get_tags
 from sklearn.utils.validation import check_is_fitted
 
@@ -89,7 +90,7 @@ class Routed(NamedTuple):
     before : Pipeline or None
         The steps before.
     synchronizer : estimator
-    trials : sequence of ndarray (n_frames_i, n_features)
+    trials : Trials
         Checked: the methods of the synchronizer take them without checking again.
     params : dict
         Other arguments of its ``match``, such as ``keyframes``.
@@ -106,7 +107,7 @@ class Routed(NamedTuple):
 
     before: Pipeline | None
     synchronizer: object
-    trials: tuple
+    trials: Trials
     params: dict
     facts: TrialFacts
     caller: str = "match"
@@ -139,8 +140,13 @@ class Routed(NamedTuple):
             return self.known
         with explain_missing(self.caller, self.hint):
             match = self.synchronizer.match(self.trials, **self.params)
-        # What a synchronizer gives in place of a match is refused where it is used.
-        return match.of_trials(self.facts, self) if hasattr(match, "of_trials") else match
+        if not hasattr(match, "of_trials"):
+            # What a synchronizer gives in place of a match is refused where it is used.
+            return match
+        # Of this fit, also after another one.
+        before = None if self.before is None else make_pipeline(*map(copy, self.steps[:-1]))
+        fitted = self._replace(before=before, synchronizer=copy(self.synchronizer))
+        return match.of_trials(self.facts, fitted)
 
 
 def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
@@ -183,15 +189,21 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     trials = synchronizer.check_trials(features)
     accepted = accepted_params(synchronizer.match, params)
     facts = TrialFacts.of(X, params.get("frame_rate"), checked=trials)
+    trials, given = facts.label(trials), accepted.get("keyframes")
+    if isinstance(given, pd.DataFrame):
+        # In the order of the trials, whose labels do not get everywhere.
+        rows = Keyframes(given, len(trials)).in_order(trials)
+        accepted["keyframes"] = pd.DataFrame(rows, columns=given.columns)
     sums = None if before is None else _sums_of(X, trials)
-    return Routed(before, synchronizer, facts.label(trials), accepted, facts, caller, hint, sums)
+    return Routed(before, synchronizer, trials, accepted, facts, caller, hint, sums)
 
 
 def _sums_of(X, trials):
     """The sum of the values of each trial, of checked ones where X is read once."""
     is_read = isinstance(X, Trials) or as_source(X) is not None
-    sequences = None if is_read else as_collection(X)
-    return np.array([np.sum(np.asarray(x, dtype=np.float64)) for x in sequences or trials])
+    sequences = trials if is_read else as_collection(X)
+    sequences = np.asarray(X) if sequences is None else sequences
+    return np.array([np.sum(np.asarray(x, dtype=np.float64)) for x in sequences])
 
 
 def _of_match(match, X, params, caller, kind):
@@ -204,22 +216,21 @@ def _of_match(match, X, params, caller, kind):
             "of given warps and of trials that were read in parts are not: give the estimator, or "
             "Match.from_estimator(estimator, X)."
         )
-    beside = [name for name, value in params.items() if value is not None]
-    if beside and beside != ["frame_rate"]:
+    beside = [k for k, value in params.items() if value is not None and k != "frame_rate"]
+    if beside:
         raise TypeError(
             f"{caller} got {beside[0]!r} beside a Match, which was made with arguments of its own: "
             f"give {beside[0]} to match, or the estimator to {caller}."
         )
-    facts = TrialFacts.of(X, params.get("frame_rate"), checked=reached.trials)
     sums = _sums_of(reached.trials, reached.trials) if reached.sums is None else reached.sums
-    same = np.array_equal(facts.lengths, match.facts.lengths)
-    if not (same and np.allclose(_sums_of(X, reached.trials), sums, 1e-9, equal_nan=True)):
+    of_these = _sums_of(X, reached.trials)
+    if len(of_these) != len(sums) or not np.allclose(of_these, sums, 1e-9, equal_nan=True):
         raise ValueError(
             f"{caller} got a Match of {counted(len(sums), 'trial')}, and X are other ones, or in "
             "another order. Give the X that were matched."
         )
-    if not facts.are_timed:
-        facts = facts._replace(frame_rates=match.facts.frame_rates)
+    rate = params.get("frame_rate")
+    facts = match.facts if rate is None else match.facts.at(rate)
     known = match.of_trials(facts, reached)
     return reached._replace(facts=facts, caller=caller, known=known)
 

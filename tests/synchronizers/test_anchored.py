@@ -205,8 +205,12 @@ def test_rows_of_a_table_are_those_of_the_trials(bunch):
     sync = DenseSynchronizer(P).fit(X, keyframes=K)
     expected = DenseSynchronizer(P).fit(bunch.data, keyframes=bunch.keyframes[:, [2]])
     np.testing.assert_array_equal(sync.pattern_, expected.pattern_)
-    with pytest.raises(ValueError, match="labelled 'trial 0', and its row of keyframes 'trial 8'"):
-        sync.match(X, keyframes=K[::-1])
+    times = sync.match(X, keyframes=K).times
+    np.testing.assert_array_equal(sync.match(X, keyframes=K[::-1]).times, times)
+    np.testing.assert_array_equal(sync.match(X.loc[names[4:]], keyframes=K).times, times[4:])
+    for table, count in ((K[1:], 0), (pd.concat([K, K[:1]]), 2)):
+        with pytest.raises(ValueError, match=f"labelled 'trial 0', and keyframes has {count} row"):
+            sync.match(X, keyframes=table)
 
 
 BAD = {
