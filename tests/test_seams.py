@@ -4,11 +4,13 @@ A function has a row in `CALLS`, which gives what it finds, and each law changes
 a way that must not change what it finds. A public function without a row fails.
 """
 
+import gc
 import inspect
 import io
 import json
 import pickle
 import re
+import weakref
 from collections import Counter
 from typing import NamedTuple
 
@@ -18,11 +20,13 @@ import pytest
 from joblib import parallel_config
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
     DenseSynchronizer,
     DirectionCosines,
+    FrameWise,
     LinearSynchronizer,
     Match,
     PartSynchronizer,
@@ -406,6 +410,48 @@ def test_a_match_is_of_its_trials(wrap, sync):
     with pytest.raises(ValueError, match="not by a synchronizer in memory"):
         compare_groups(pickle.loads(pickle.dumps(match)), GAIT.data, GAIT.group)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(match)).seconds(), match.seconds())
+
+
+def test_a_match_stays_that_of_its_fit():
+    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(51)).fit(GAIT.data)
+    match = Match.from_estimator(pipe, GAIT.data)
+    before = verdicts_of(match)
+    pipe.set_params(densesynchronizer__n_frames=31).fit([10 * x for x in GAIT.data])
+    pd.testing.assert_frame_equal(verdicts_of(match), before)
+
+
+def verdicts_of(match):
+    return compare_to_norm(match, GAIT.data, GAIT.group, norm="A", groups=GAIT.person).departures
+
+
+def test_frame_rates_of_a_match_are_those_it_was_told(sync):
+    tables = [pd.DataFrame(x) for x in GAIT.data]
+    for x in tables:
+        x.attrs["frame_rate"] = 60.0
+    match = Match.from_estimator(sync, tables, keyframes=EVENTS / 30, frame_rate=30.0)
+    shown = display.GroupDisplay.from_estimator(match, tables, GAIT.group, unit="seconds")
+    lasting = (np.median([len(x) for x in tables]) - 1) / 30
+    np.testing.assert_allclose([np.median(match.seconds()[:, -1]), shown.axis.clock[-1]], lasting)
+
+
+def test_what_is_hidden_in_a_match_is_hidden_in_what_it_warps(sync):
+    confidence = [np.ones(x.shape) for x in GAIT.data]
+    confidence[2][20:24, 1] = 0.1
+    match = sync.match(GAIT.data, keyframes=EVENTS, confidence=confidence)
+    expected = sync.transform(GAIT.data, keyframes=EVENTS, confidence=confidence)
+    assert np.isnan(expected).any()
+    np.testing.assert_array_equal(sync.transform_matched(GAIT.data, match), expected)
+
+
+def test_what_is_learnt_of_a_model_goes_with_it():
+    X = LinearSynchronizer(30).fit_transform(GAIT.data)
+    model = ActionModel().fit(X)
+    find_departures(model, X[:1])
+    assert len(pickle.dumps(model)) == len(pickle.dumps(pickle.loads(pickle.dumps(model))))
+    known = weakref.ref(model)
+    del model
+    gc.collect()
+    assert known() is None
 
 
 def test_a_live_synchronizer_takes_keyframes_in_its_seconds():
