@@ -181,6 +181,7 @@ class Match:
         Returns
         -------
         Match
+            A copy that knows them.
         """
         known = copy(self)
         known.facts, known.reached = facts, reached
