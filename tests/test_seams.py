@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from joblib import parallel_config
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import (
@@ -399,7 +399,7 @@ def test_a_match_is_of_its_trials(wrap, sync):
             compare_groups(match, X, GAIT.group)
     with pytest.raises(TypeError, match="'keyframes' beside a Match"):
         compare_groups(match, GAIT.data, GAIT.group, keyframes=EVENTS)
-    with pytest.raises(ValueError, match="not by a synchronizer in memory"):
+    with pytest.raises(ValueError, match="without the synchronizer and the trials"):
         compare_groups(pickle.loads(pickle.dumps(match)), GAIT.data, GAIT.group)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(match)).seconds(), match.seconds())
 
@@ -433,6 +433,35 @@ def test_what_is_hidden_in_a_match_is_hidden_in_what_it_warps(sync):
     expected = sync.transform(GAIT.data, keyframes=EVENTS, confidence=confidence)
     assert np.isnan(expected).any()
     np.testing.assert_array_equal(sync.transform_matched(GAIT.data, match), expected)
+
+
+class EvenSynchronizer(BaseEstimator):
+    """A synchronizer that is not derived from `Synchronizer`: it has what functions ask for."""
+
+    def fit(self, X, y=None):
+        self.linear_ = LinearSynchronizer(31).fit(X)
+        self.n_frames_ = 31
+        return self
+
+    def check_trials(self, X):
+        return self.linear_.check_trials(X)
+
+    def normalize(self, X):
+        return self.linear_.normalize(X)
+
+    def match(self, X):
+        return Match(self.linear_.match(X).times)
+
+    def transform(self, X):
+        return self.linear_.transform(X)
+
+
+def test_a_synchronizer_of_another_base_serves_detectors():
+    scores = []
+    for synchronizer in (EvenSynchronizer(), LinearSynchronizer(31)):
+        detector = ActionDetector(make_pipeline(synchronizer, ActionModel()))
+        scores.append(detector.fit(GAIT.data, groups=GAIT.person).score_samples(GAIT.data[:4]))
+    np.testing.assert_array_equal(*scores)
 
 
 def test_what_is_learnt_of_a_model_goes_with_it():

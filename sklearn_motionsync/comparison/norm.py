@@ -308,7 +308,8 @@ def _largest_deviations(of_people, k):
     for i, x in enumerate(of_people):
         mean, std = _of_norm(np.delete(means, i, axis=0))
         # Means of k trials, of which each begins with another one.
-        curves = [np.roll(x, start, axis=0)[:k].mean(axis=0) for start in range(len(x))]
+        n_starts = len(x) if k < len(x) else 1
+        curves = [np.roll(x, start, axis=0)[:k].mean(axis=0) for start in range(n_starts)]
         z = np.abs((np.stack(curves) - mean) / std).max(axis=(1, 2))
         logs.append(np.log(np.maximum(z, np.finfo(float).tiny)))
         weights.append(np.full(len(z), 1 / len(z)))

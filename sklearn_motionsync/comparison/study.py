@@ -537,6 +537,7 @@ def _order_of_values(curves, flips):
     """
     keys = []
     for values in curves:
+        # Weighted, as plain sums of different curves may be equal.
         weights = np.sin(1.0 + np.arange(values[0].size)).reshape(values[0].shape)
         sums = np.nansum(weights * values, axis=(1, 2))
         keys.append(np.abs(sums) if flips else sums)

@@ -375,13 +375,12 @@ class _Expected:
         """That of an estimator, which is kept until one of its steps is fitted again."""
         steps = flat_steps(estimator)
         state = [v for step in steps for name, v in vars(step).items() if name != KEPT]
-        kept = vars(find_step(estimator, ActionModel)[1]).setdefault(KEPT, {})
-        key = repr(features)
-        before, expected = kept.get(key, ([], None))
+        by_features = vars(find_step(estimator, ActionModel)[1]).setdefault(KEPT, {})
+        before, expected = by_features.get(repr(features), ([], None))
         same = len(before) == len(state) and all(a is b for a, b in zip(before, state, strict=True))
         if not same:
             expected = cls(estimator, features)
-            kept[key] = state, expected
+            by_features[repr(features)] = state, expected
         return expected
 
     def filled(self, whole):

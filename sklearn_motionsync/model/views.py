@@ -314,7 +314,7 @@ def _names(steps, estimator, n_features):
 
 def _through(step, points, params, matches, X):
     """Trials X after a step; if it matches them, it warps them by this match, which is appended."""
-    if not hasattr(step, "transform_matched"):
+    if not hasattr(step, "match"):
         return step.transform(points, **accepted_params(step.transform, params))
     _, synchronizer = find_synchronizer(step)
     trials = synchronizer.check_trials(points)
@@ -325,6 +325,9 @@ def _through(step, points, params, matches, X):
     seen = trials if match.reached is None else match.reached.trials
     reached = Routed(None, synchronizer, seen, accepted, facts)
     matches.append(match.of_trials(facts, reached))
+    if not hasattr(step, "transform_matched"):
+        # One that is not derived from `Synchronizer` matches again.
+        return step.transform(points, **accepted_params(step.transform, params))
     return step.transform_matched(seen, match, **accepted_params(step.transform_matched, params))
 
 

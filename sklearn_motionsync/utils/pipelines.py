@@ -123,11 +123,11 @@ class Routed(NamedTuple):
     @property
     def keyframes(self):
         """Key-frames that were given, as shares of the trials: a table by name, None without."""
-        given = self.params.get("keyframes")
-        if given is None:
+        keyframes = self.params.get("keyframes")
+        if keyframes is None:
             return None
-        rows = Keyframes(given, len(self.trials), self.params.get("frame_rate"))
-        return pd.DataFrame(rows.shares(self.trials), columns=getattr(given, "columns", None))
+        rows = Keyframes(keyframes, len(self.trials), self.params.get("frame_rate"))
+        return pd.DataFrame(rows.shares(self.trials), columns=getattr(keyframes, "columns", None))
 
     @property
     def takes_params(self):
@@ -189,11 +189,11 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     trials = synchronizer.check_trials(features)
     accepted = accepted_params(synchronizer.match, params)
     facts = TrialFacts.of(X, params.get("frame_rate"), checked=trials)
-    trials, given = facts.label(trials), accepted.get("keyframes")
-    if isinstance(given, pd.DataFrame):
-        # In the order of the trials, whose labels do not get everywhere.
-        rows = Keyframes(given, len(trials)).in_order(trials)
-        accepted["keyframes"] = pd.DataFrame(rows, columns=given.columns)
+    trials, keyframes = facts.label(trials), accepted.get("keyframes")
+    if isinstance(keyframes, pd.DataFrame):
+        # In the order of the trials, whose labels are lost where a match is made again of parts.
+        rows = Keyframes(keyframes, len(trials)).in_order(trials)
+        accepted["keyframes"] = pd.DataFrame(rows, columns=keyframes.columns)
     sums = None if before is None else _sums_of(X, trials)
     return Routed(before, synchronizer, trials, accepted, facts, caller, hint, sums)
 
@@ -209,12 +209,16 @@ def _sums_of(X, trials):
 def _of_match(match, X, params, caller, kind):
     """What reached the synchronizer that made a match of the trials X."""
     reached = match.reached
-    if reached is None or not (kind is None or isinstance(reached.synchronizer, kind)):
-        wanted = "a synchronizer" if kind is None else f"a {kind.__name__}"
+    if reached is None:
         raise ValueError(
-            f"{caller} got a Match that is not by {wanted} in memory, which unpickled ones, those "
-            "of given warps and of trials that were read in parts are not: give the estimator, or "
-            "Match.from_estimator(estimator, X)."
+            f"{caller} got a Match without the synchronizer and the trials that it was made of: "
+            "one of given warps, of trials that were read in parts, or from a file. Give the "
+            "estimator, or Match.from_estimator(estimator, X)."
+        )
+    if kind is not None and not isinstance(reached.synchronizer, kind):
+        raise ValueError(
+            f"{caller} needs a Match by a {kind.__name__}, and got one by a "
+            f"{type(reached.synchronizer).__name__}."
         )
     beside = [k for k, value in params.items() if value is not None and k != "frame_rate"]
     if beside:
