@@ -27,6 +27,7 @@ from ..utils.pipelines import (
     MissingMetadata,
     accepted_params,
     flat_steps,
+    matches_of_a_fit,
     steps_to_fit,
     takes_gaps,
 )
@@ -216,13 +217,13 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         groups = params.pop(name, None) if groups is None else groups
         fit_params = params if groups is None else {**params, name: groups}
         with self._progress(fits=True) as progress:
-            with progress.fitting(pipeline, "fitting the pipeline"):
+            with progress.fitting(pipeline, "fitting the pipeline"), matches_of_a_fit() as matches:
                 pipeline.fit(X, y, **fit_params)
             also = {name.rpartition("__")[2]: value for name, value in params.items()}
             takers = [getattr(step, "match", step.transform) for step in flat_steps(pipeline)[:-1]]
             accepted = [accepted_params(taker, also) for taker in takers]
             also = {name: value for params in accepted for name, value in params.items()}
-            tests = self._learn(pipeline, X, also, groups)
+            tests = self._learn(pipeline, X, also, groups, matches)
         self.estimator_, self._tests = pipeline, tests
         self.borders_ = {
             "movement": (0.0, tests.aligned.threshold_),
@@ -365,9 +366,9 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         tags.input_tags.allow_nan = takes_gaps(self.estimator)
         return tags
 
-    def _learn(self, pipeline, X, params, groups):
+    def _learn(self, pipeline, X, params, groups, matches):
         """All tests, by the training trials of a fitted pipeline."""
-        curves = curves_of(pipeline, X, params, "ActionDetector.fit")
+        curves = curves_of(pipeline, X, params, "ActionDetector.fit", matches)
         trials, synchronizer = curves.match.reached.trials, curves.match.reached.synchronizer
         codes, _ = encode_groups(groups, len(trials), at_least=2)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)

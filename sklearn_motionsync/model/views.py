@@ -1,5 +1,6 @@
 """The models inside fitted estimators: in chosen features, in limbs, and of each class."""
 
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -77,7 +78,7 @@ class Curves(NamedTuple):
         return self.route.names_of_poses()
 
 
-def curves_of(estimator, X, params, caller):
+def curves_of(estimator, X, params, caller, known=None):
     """Trials on the clock of the model of an estimator, with what an aSpace leaves out.
 
     Parameters
@@ -89,13 +90,15 @@ def curves_of(estimator, X, params, caller):
         What synchronizing X takes besides, such as ``keyframes``.
     caller : str
         The public function that the user called with (estimator, X), for messages.
+    known : dict, default=None
+        As `matches_of_a_fit` gives it, if X are the trials of the fit.
 
     Returns
     -------
     Curves
     """
     before, model = find_step(estimator, ActionModel)
-    return _Route.to(before, model).curves(X, params, caller)
+    return _Route.to(before, model).curves(X, params, caller, known or {})
 
 
 class View(NamedTuple):
@@ -279,7 +282,7 @@ class _Route(NamedTuple):
         points, beside = np.split(points, [len(components)], axis=2)
         return np.concatenate([points @ components + mean, beside], axis=2)
 
-    def curves(self, X, params, caller):
+    def curves(self, X, params, caller, known=MappingProxyType({})):
         """The `Curves` of trials, each matched once."""
         steps = [*self.before, *self.after]
         methods = [(step, name) for step in steps for name in ("match", "transform")]
@@ -288,14 +291,14 @@ class _Route(NamedTuple):
         points, whole, matches = X, None, []
         with explain_missing(caller):
             for step in self.before:
-                points = _through(step, points, params, matches, X)
+                points = _through(step, points, params, matches, X, known)
             if self.aspace is not None:
                 whole = check_trials(
                     self.aspace, points, reset=False, level="pose", finite="allow-nan"
                 )
                 points = self.aspace.transform(points)
             for step in self.after:
-                points = _through(step, points, params, matches, X)
+                points = _through(step, points, params, matches, X, known)
                 whole = whole if whole is None else matches[-1].warp(whole)
         checked, match = self.model.check_trials(points), matches[0] if matches else None
         rate = params.get("frame_rate")
@@ -312,15 +315,20 @@ def _names(steps, estimator, n_features):
     return names_of_features(make_pipeline(*steps) if steps else None, estimator, n_features)
 
 
-def _through(step, points, params, matches, X):
-    """Trials X after a step; if it matches them, it warps them by this match, which is appended."""
+def _through(step, points, params, matches, X, known):
+    """Trials X after a step; if it matches them, it warps them by this match, which is appended.
+
+    One that matched them in its fit is known.
+    """
     if not hasattr(step, "match"):
         return step.transform(points, **accepted_params(step.transform, params))
     _, synchronizer = find_synchronizer(step)
     trials = synchronizer.check_trials(points)
     facts = TrialFacts.of(X, params.get("frame_rate"), checked=trials)
     accepted = accepted_params(synchronizer.match, params)
-    match = synchronizer.match(facts.label(trials), **accepted)
+    _, match = known.get(id(synchronizer), (None, None))
+    if match is None:
+        match = synchronizer.match(facts.label(trials), **accepted)
     # What is hidden by a confidence is hidden in the trials of the match.
     seen = trials if match.reached is None else match.reached.trials
     reached = Routed(None, synchronizer, seen, accepted, facts)

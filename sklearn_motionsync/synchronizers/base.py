@@ -49,7 +49,7 @@ from ..matching.warps import normalise
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from ..utils.pipelines import Routed
+from ..utils.pipelines import Routed, remember_match
 from .intervals import Intervals, joined
 from .match import Match, check_match
 from .training import (
@@ -554,6 +554,8 @@ class AnchoredSynchronizer(Synchronizer):
             As from ``transform``.
         """
         self.fit(X, y, keyframes, frame_rate, confidence)
+        if remember_match(self, None):
+            return self.transform_matched(X, self.match(X, keyframes, frame_rate, confidence))
         return self.transform(X, keyframes, frame_rate, confidence)
 
     def transform(
@@ -617,7 +619,9 @@ class AnchoredSynchronizer(Synchronizer):
         facts = TrialFacts.of(trials, frame_rate)
         # Of this fit, also after another one.
         reached = Routed(None, copy(self), trials, params, facts)
-        return self._match(trials, **params).of_trials(facts, reached)
+        match = self._match(trials, **params).of_trials(facts, reached)
+        remember_match(self, match)
+        return match
 
     def _given(self, X, keyframes, frame_rate, confidence=None) -> dict[str, Any]:
         """What is given, as arguments of ``_seen`` and ``_match``."""

@@ -2,6 +2,7 @@
 
 import inspect
 from contextlib import contextmanager
+from contextvars import ContextVar
 from copy import copy
 from functools import lru_cache
 from typing import NamedTuple
@@ -29,7 +30,9 @@ __all__ = [
     "find_synchronizer",
     "flat_steps",
     "index_of_pattern",
+    "matches_of_a_fit",
     "refuse_params",
+    "remember_match",
     "route_to_synchronizer",
     "steps_to_fit",
     "takes_gaps",
@@ -40,6 +43,31 @@ __all__ = [
 
 # Parameters of synchronizers that take key-frames.
 _OF_KEYFRAMES = ("keyframes", "frame_rate")
+
+# What is matched while a pipeline is fitted: by the id of each synchronizer, it and its match.
+_matches: ContextVar[dict | None] = ContextVar("matches", default=None)
+
+
+@contextmanager
+def matches_of_a_fit():
+    """Collect the matches of the synchronizers that are fitted in this context.
+
+    The ``fit`` of scikit-learn's pipelines warps the training trials and hands on no match; who
+    goes on with the same trials takes it from here and does not match them again.
+    """
+    token = _matches.set({})
+    try:
+        yield _matches.get()
+    finally:
+        _matches.reset(token)
+
+
+def remember_match(synchronizer, match):
+    """Keep a match where `matches_of_a_fit` collects them; whether it does."""
+    matches = _matches.get()
+    if matches is not None and match is not None:
+        matches[id(synchronizer)] = (synchronizer, match)
+    return matches is not None
 
 
 class MissingMetadata(ValueError):
