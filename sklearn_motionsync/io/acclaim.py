@@ -15,7 +15,7 @@ _DOFS = ("tx", "ty", "tz", "rx", "ry", "rz")
 
 
 def read_acclaim(path, *, asf=None):
-    """An AMC file as a reader of `motion.READERS` returns it; `asf` is its skeleton."""
+    """An AMC file as a reader of `motion.FORMATS` returns it; `asf` is its skeleton."""
     asf = find_asf(path) if asf is None else Path(asf)
     bones, length_unit, in_degrees = read_asf(asf)
     text = MotionText(path)

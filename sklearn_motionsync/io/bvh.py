@@ -13,7 +13,7 @@ _CHANNELS = [axis + kind for kind in (b"POSITION", b"ROTATION") for axis in (b"X
 
 
 def read_bvh(path):
-    """A BVH file as a reader of `motion.READERS` returns it.
+    """A BVH file as a reader of `motion.FORMATS` returns it.
 
     A position channel takes the place of the component of OFFSET that it names, at every
     joint; a component without a channel stays at OFFSET.

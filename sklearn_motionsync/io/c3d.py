@@ -19,12 +19,8 @@ _MAX_HEADER_EVENTS = 18
 _LONG_LABELS = 12345
 
 
-class MissingGroup(ValueError):
-    """A file has no such group."""
-
-
 def read_c3d(path, *, group="markers"):
-    """A C3D file as a reader of `motion.READERS` returns it; invalid points are NaN.
+    """A C3D file as a reader of `motion.FORMATS` returns it; invalid points are NaN.
 
     `group` is "markers", "analog", or a group of points that the file lists.
     """
@@ -499,7 +495,7 @@ def _check_group(file, groups, group):
     if group in groups and groups[group]["n"]:
         return
     there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
-    raise MissingGroup(
+    raise ValueError(
         f"{file.path}: there are no {group[:40]} in this file; read_motion(..., group=...) reads "
         f"{', '.join(there)[:300]}."
     )

@@ -6,8 +6,9 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable, Iterable
+from numbers import Real
 from pathlib import Path as FilePath
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,36 +21,70 @@ from ..inputs.types import Path
 from ..inputs.wording import counted
 from .acclaim import read_acclaim
 from .bvh import read_bvh
-from .c3d import MissingGroup, read_c3d
+from .c3d import read_c3d
 from .gaps import check_filling, fill_gaps, warn_of_gaps
-from .text import FARTHEST, read_storage
+from .text import FARTHEST, make_unique, read_storage
 from .trc import read_trc
 
-# The readers, by the ending of the file's name in small letters. A format is one function and one
-# entry for each of its endings.
-#
-# A reader gets the path of a file that exists (a `pathlib.Path`), and as keyword parameters those
-# options of `read_motion` that only some formats have (``asf``, ``group``) and that were given.
-# It returns a dict with
-#
-# - ``positions``, floats (n_frames, n_joints, 3), NaN where a joint was not seen, with ``joints``
-#   (unique names) and ``parents`` (indices, -1 for a root); or ``values``, floats (n_frames,
-#   n_channels), with ``channels`` (unique names);
-# - ``frame_rate`` (frames per second or None), ``units`` (str, list of str or None), ``up`` ("x",
-#   "y", "z", "-x", ... or None) and ``kind`` (what was measured, such as "markers");
-# - for formats with a time in each row ``times`` (seconds, not decreasing) and ``decimals`` (how
-#   many they were written with); ``frame_rate`` is then the rate that the header states;
-# - whatever else goes into ``attrs``, as plain Python types.
-#
-# A file that is damaged or not complete is a ValueError that begins with its path.
-READERS: dict[str, Callable[..., dict]] = {
-    ".bvh": read_bvh,
-    ".amc": read_acclaim,
-    ".c3d": read_c3d,
-    ".trc": read_trc,
-    ".mot": read_storage,
-    ".sto": read_storage,
-}
+
+class MotionFormat(NamedTuple):
+    """A format of files: how they are known, and their reader.
+
+    A reader gets the path of what exists (a `pathlib.Path`), and as keyword parameters those
+    options of `read_motion` that only some formats have (``asf``, ``group``) and that were given.
+    It returns a dict with
+
+    - ``positions``, floats (n_frames, n_joints, 3) or (n_frames, n_joints, 2), NaN where a joint
+      was not seen, with ``joints`` (unique names) and ``parents`` (indices, -1 for a root); or
+      ``values``, floats (n_frames, n_channels), with ``channels`` (unique names);
+    - optionally ``confidence``, floats (n_frames, n_joints), and ``subjects``, a list with the
+      subject of each joint or channel, "" where it has none; its name is then no part of the
+      names, which are unique within a subject;
+    - ``frame_rate`` (frames per second or None), ``units`` (str, list of str or None), ``up`` ("x",
+      "y", "z", "-x", ... or None) and ``kind`` (what was measured, such as "markers");
+    - for formats with a time in each row ``times`` (seconds, not decreasing) and ``decimals`` (how
+      many they were written with); ``frame_rate`` is then the rate that the header states;
+    - whatever else goes into ``attrs``, as plain Python types: ``left_out`` is a line about what
+      was not read.
+
+    A file that is damaged or not complete is a ValueError that begins with its path.
+
+    Attributes
+    ----------
+    name : str
+        As it is called; ``attrs["format"]`` is the ending of the file where ``name`` is None.
+    endings : tuple of str
+        Of names of files, in small letters; a folder has none.
+    fits : callable
+        Tells by the path and the first bytes of a file, b"" of a folder, whether it is one.
+    read : callable
+    """
+
+    name: str | None
+    endings: tuple[str, ...]
+    fits: Callable[[FilePath, bytes], bool]
+    read: Callable[..., dict]
+
+    @property
+    def keys(self):
+        """What ``attrs["format"]`` may be."""
+        return (self.name,) if self.name else tuple(x.removeprefix(".") for x in self.endings)
+
+
+# The first bytes of a file, by which its format is known.
+_HEAD = 2**16
+
+# Where the beginning of a file fits none, its ending tells.
+FORMATS = [
+    MotionFormat(
+        None, (".bvh",), lambda path, head: head.lstrip().startswith(b"HIERARCHY"), read_bvh
+    ),
+    MotionFormat(None, (".amc",), lambda path, head: False, read_acclaim),
+    MotionFormat(None, (".c3d",), lambda path, head: head[1:2] == b"\x50", read_c3d),
+    MotionFormat(None, (".trc",), lambda path, head: head.startswith(b"PathFileType"), read_trc),
+    MotionFormat(None, (".mot", ".sto"), lambda path, head: False, read_storage),
+]
+ENDINGS = tuple(ending for each in FORMATS for ending in each.endings)
 
 
 def read_motion(
@@ -61,14 +96,19 @@ def read_motion(
     ends: Literal["keep", "trim"] = "keep",
     group: str | None = None,
     columns: Literal["common"] | None = None,
+    subject: str | None = None,
+    min_confidence: float | None = None,
+    quality: Literal["drop", "keep"] = "drop",
+    verbose: int = 0,
 ) -> Any:
-    """Read recordings from files of motion capture (BVH, AMC, C3D, TRC, MOT or STO).
+    """Read recordings from files of motion capture, whatever program wrote them.
 
     Parameters
     ----------
     path : str, path-like, or iterable of them
-        A file that ends with ``.bvh``, ``.amc``, ``.c3d``, ``.trc``, ``.mot`` or ``.sto``, in any
-        case; or several, such as ``sorted(folder.glob("*.c3d"))``.
+        A file, which is known by what it holds (the manual's page of motion files lists the
+        formats), or a folder of key-points with a file a frame; or several, such as
+        ``sorted(folder.glob("*.c3d"))``. Any other folder is read file by file.
     asf : str or path-like, default=None
         The skeleton of an AMC file. By default the ``.asf`` file of its folder with the longest
         name that the AMC file's begins with (``02.asf`` for ``02_01.amc``), or the only one.
@@ -86,11 +126,24 @@ def read_motion(
     columns : {None, "common"}, default=None
         Of several files: "common" leaves out the columns that some of them lack, such as other
         markers, and brings the others into the order of the first. By default all stay.
+    subject : str, default=None
+        The subject to read, of a file that names several. By default all are read, and
+        the name of each joint begins with its subject's, as in "Ann:LASI". The only subject of a
+        file is no part of the names.
+    min_confidence : float, default=None
+        Positions of less confidence become NaN, where the file tells one. By default all are
+        kept.
+    quality : {"drop", "keep"}, default="drop"
+        "keep" adds the columns ``<joint>_confidence`` behind the positions.
+    verbose : int, default=0
+        Above 0, what was read of each file and what was left out is printed, which is
+        ``attrs["report"]``.
 
     Returns
     -------
     DataFrame (n_frames, 3 * n_joints), or list of DataFrame
-        Of several files a list. Float64 columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint
+        Of several files a list. Those that cannot be read are left out of it with a warning, unless
+        none can. Float64 columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint
         by joint, and an index named "frame", from 0. A marker that was not seen is NaN. The group
         "analog" has a column for each channel, and a row for each sample; a MOT or STO file a
         column for each of its own but the time. Its ``attrs`` hold ``format``, ``frame_rate``,
@@ -137,13 +190,29 @@ def read_motion(
             "columns must be None, or 'common' with a list of several files, got "
             f"columns={columns!r} for {path!r}."
         )
+    if quality not in ("drop", "keep"):
+        raise ValueError(f"quality must be 'drop' or 'keep', got {quality!r}.")
+    check_confidence(min_confidence)
     options: dict[str, Any] = {"asf": asf, "group": group}
+    generic = {
+        "frame_rate": frame_rate, "max_gap": max_gap, "ends": ends, "subject": subject,
+        "min_confidence": min_confidence, "quality": quality, "verbose": verbose,
+    }  # fmt: skip
     if not isinstance(path, (str, os.PathLike)):
-        options |= {"frame_rate": frame_rate, "max_gap": max_gap, "ends": ends}
-        return _read_several(path, columns, options)
+        return _read_several(path, columns, options | generic)
     path = FilePath(path)
-    motion = _read_file(path, options)
+    known = _format_of(path)
+    if known is None:
+        files = sorted(x for x in path.iterdir() if x.suffix.lower() in ENDINGS)
+        if not files:
+            raise FileNotFoundError(f"There is no motion file at {path}, a folder without any.")
+        return _read_several(files, columns, options | generic)
+    motion = _read_file(path, known, options)
     _hide_damage(motion, path)
+    choose_subject(motion, subject, path)
+    confidence = motion.pop("confidence", None)
+    if min_confidence is not None and confidence is not None:
+        motion["positions"][confidence < min_confidence] = np.nan
     if "times" in motion:
         motion |= describe_times(
             path.name,
@@ -154,31 +223,93 @@ def read_motion(
         )
     elif frame_rate is not None:
         motion["frame_rate"] = float(frame_rate)
-    df = _to_frame(motion, path)
+    df = _to_frame(motion, path, known)
     if max_gap or ends != "keep":
         df = fill_gaps(df, max_gap, ends=ends)
+    df.attrs["report"] = _report(df)
+    if verbose:
+        print(f"{path.name}: {df.attrs['report']}")
     warn_of_gaps(df, path.name)
-    return df
+    is_wanted = quality == "keep" and confidence is not None
+    return _with_confidence(df, confidence) if is_wanted else df
 
 
-def _read_file(path, options):
-    """What the reader of a file returns, which is given the options that were chosen."""
+def check_confidence(min_confidence):
+    if not isinstance(min_confidence, Real | None) or isinstance(min_confidence, bool):
+        raise ValueError(f"min_confidence must be a number such as 0.6, got {min_confidence!r}.")
+
+
+def _format_of(path):
+    """The `MotionFormat` of a file or folder; None of a folder of several recordings."""
+    if path.is_dir():
+        return next((each for each in FORMATS if each.fits(path, b"")), None)
     if not path.is_file():
         raise FileNotFoundError(f"There is no motion file at {path}.")
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
+    with path.open("rb") as file:
+        head = file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
+    ending = path.suffix.lower()
+    fitting = [each for each in FORMATS if each.fits(path, head)]
+    fitting = fitting or [each for each in FORMATS if ending in each.endings]
+    if not fitting:
         raise ValueError(
-            f"{path} ends with {path.suffix!r}, which no reader is for; the known endings are "
-            f"{_join(READERS)}."
+            f"{path} ends with {path.suffix!r}, which no reader is for, and does not begin like a "
+            f"format that is known by its content; the known endings are {_join(ENDINGS)}."
         )
+    return fitting[0]
+
+
+def _read_file(path, known, options):
+    """What the reader of a file returns, which is given the options that were chosen."""
     options = {name: value for name, value in options.items() if value is not None}
     for name, value in options.items():
-        endings = [end for end in READERS if name in inspect.signature(READERS[end]).parameters]
-        if path.suffix.lower() not in endings:
+        takers = [each for each in FORMATS if name in inspect.signature(each.read).parameters]
+        if known not in takers:
+            endings = dict.fromkeys(ending for each in takers for ending in each.endings)
             raise ValueError(
-                f"{name}= goes with {_join(endings)} files only, got {name}={value!r} with {path}."
+                f"{name}= goes with {_join(list(endings))} files only, got {name}={value!r} with "
+                f"{path}."
             )
-    return reader(path, **options)
+    return known.read(path, **options)
+
+
+def choose_subject(motion, subject, path):
+    """Keep the joints of a subject, or name each by its own; of one subject names tell nothing."""
+    subjects = motion.pop("subjects", None) or []
+    names = [name for name in dict.fromkeys(subjects) if name]
+    if subject is not None and subject not in names:
+        there = f"its subjects are {names}" if names else "it names none"
+        raise ValueError(f"{path}: there is no subject {subject!r}; {there}.")
+    what = "joints" if "joints" in motion else "channels"
+    if subject is not None or len(names) == 1:
+        motion["subject"] = names[0] if subject is None else subject
+        if len(names) > 1:
+            motion |= _taken(motion, [i for i, each in enumerate(subjects) if each == subject])
+        motion[what] = make_unique(motion[what])
+    elif names:
+        motion["subject"] = names
+        of_each = zip(subjects, motion[what], strict=True)
+        motion[what] = make_unique([f"{a}:{b}" if a else b for a, b in of_each])
+        warnings.warn(
+            f"{path.name} holds {counted(len(names), 'subject')} {listed(names)}, and the names of "
+            f"joints begin with theirs, as {motion[what][0]!r}. subject={names[0]!r} reads one.",
+            UserWarning,
+            stacklevel=3,
+        )
+
+
+def _taken(motion, places):
+    """What a motion holds of joints or channels at these places."""
+    taken = {}
+    for key in ("joints", "channels", "units"):
+        if isinstance(motion.get(key), list):
+            taken[key] = [motion[key][i] for i in places]
+    for key in ("positions", "values", "confidence"):
+        if key in motion:
+            taken[key] = motion[key][:, places]
+    if "parents" in motion:
+        parents = [motion["parents"][i] for i in places]
+        taken["parents"] = [places.index(i) if i in places else -1 for i in parents]
+    return taken
 
 
 def _hide_damage(motion, path):
@@ -206,17 +337,17 @@ def _hide_damage(motion, path):
 
 
 def _read_several(paths, columns, options):
-    """The recordings of those files that have the group, with all columns or the common ones."""
+    """The recordings of those files that can be read, with all columns or the common ones."""
     recordings, refused = [], []
     for path in paths:
         try:
             recordings.append(read_motion(path, **options))
-        except MissingGroup as error:
+        except (ValueError, OSError) as error:
             refused.append(error)
     if not recordings:
         raise refused[0] if refused else ValueError("There are no files to read, got none.")
-    for missing in refused:
-        warnings.warn(f"{missing} The file is left out.", UserWarning, stacklevel=3)
+    for error in refused:
+        warnings.warn(f"{error} The file is left out.", UserWarning, stacklevel=3)
     return _keep_common(recordings) if columns else recordings
 
 
@@ -259,18 +390,45 @@ def _join(endings):
     return f"{', '.join(before)} and {last}" if before else last
 
 
-def _to_frame(motion, path):
+def _to_frame(motion, path, known):
     if "positions" in motion:
         values = motion.pop("positions")
+        columns = [
+            f"{joint}_{axis}" for joint in motion["joints"] for axis in "xyz"[: values.shape[2]]
+        ]
         values = values.reshape(len(values), -1)
-        columns = [f"{joint}_{axis}" for joint in motion["joints"] for axis in "xyz"]
     else:
         values, columns = motion.pop("values"), motion["channels"]
     index = pd.RangeIndex(len(values), name="frame")
     df = pd.DataFrame(values, columns=columns, index=index, copy=False)
-    df.attrs = {"format": path.suffix.lower().removeprefix(".")} | motion
+    df.attrs = {"format": known.name or path.suffix.lower().removeprefix(".")} | motion
     df.attrs |= {"trial": path.stem, "levels": ["recording", FRAME]}
     return df
+
+
+def _with_confidence(df, confidence):
+    """A recording with the confidence of its joints in columns behind the positions."""
+    columns = [f"{joint}_confidence" for joint in df.attrs["joints"]]
+    # The ends of a recording may have been left out.
+    of_joints = pd.DataFrame(confidence, columns=columns).reindex(df.index)
+    joined = pd.concat([df, of_joints], axis=1)
+    joined.attrs = df.attrs
+    return joined
+
+
+def _report(df):
+    """What was read of a file, in sentences."""
+    attrs = df.attrs
+    of = "joint" if "joints" in attrs else "channel"
+    rate, subject = attrs["frame_rate"], attrs.get("subject")
+    units = attrs["units"] if isinstance(attrs["units"], str) else None
+    text = (
+        f"{counted(len(df), 'frame')} of {counted(len(attrs[f'{of}s']), of)} ({attrs['kind']})"
+        f"{'' if rate is None else f' at {rate:g} Hz'}{'' if units is None else f' in {units}'}."
+    )
+    if subject is not None:
+        text += f" Subject: {subject if isinstance(subject, str) else ', '.join(subject)}."
+    return f"{text} Left out: {attrs['left_out']}." if attrs.get("left_out") else text
 
 
 # -- times of frames: even ones give a frame rate, uneven ones are kept and warned of --------------

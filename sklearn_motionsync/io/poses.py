@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Hashable
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import pandas as pd
 
 from ..inputs.tables import FRAME, label_of_part
 from .gaps import fill_gaps
-from .motion import check_frame_rate, describe_times
+from .motion import check_confidence, check_frame_rate, describe_times
 from .text import make_unique
 
 _DIMENSIONS = ("time", "individual", "keypoint", "space")
@@ -91,8 +90,7 @@ def from_poses(
     (['hip_x', 'hip_y', 'knee_x', 'knee_y'], 30.0, 'ann')
     """
     check_frame_rate(frame_rate)
-    if not isinstance(min_confidence, Real | None):
-        raise ValueError(f"min_confidence must be a number such as 0.6, got {min_confidence!r}.")
+    check_confidence(min_confidence)
     position, confidence, attrs = _split_poses(poses)
     position, values = _arrange(position, "position", _DIMENSIONS)
     axes = _read_axes(position)

@@ -318,7 +318,7 @@ _ANGLE_UNITS |= dict.fromkeys((b"no", b"n", b"false", b"0"), "rad")
 
 
 def read_storage(path):
-    """A MOT or STO file as a reader of `motion.READERS` returns it."""
+    """A MOT or STO file as a reader of `motion.FORMATS` returns it."""
     text = MotionText(path)
     header = _read_header(text)
     labels = _read_labels(text)

@@ -21,7 +21,7 @@ _AXIS = re.compile(rb"[XYZxyz]\d*")
 
 
 def read_trc(path):
-    """A TRC file as a reader of `motion.READERS` returns it; markers that were not seen are NaN."""
+    """A TRC file as a reader of `motion.FORMATS` returns it; markers that were not seen are NaN."""
     text = MotionText(path)
     first = split_fields(text.row())
     if not first or not first[0].lower().startswith(b"pathfiletype"):

@@ -52,7 +52,7 @@ _matches: ContextVar[dict | None] = ContextVar("matches", default=None)
 def matches_of_a_fit():
     """Collect the matches of the synchronizers that are fitted in this context.
 
-    The ``fit`` of scikit-learn's pipelines warps the training trials and hands on no match; who
+    The ``fit`` of scikit-learn's pipelines warps the training trials and hands on no match. What
     goes on with the same trials takes it from here and does not match them again.
     """
     token = _matches.set({})

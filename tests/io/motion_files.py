@@ -276,13 +276,13 @@ def storage(values, labels, rate=100, times=None, header="version=1\nnRows={n}\n
 
 
 VECTORS, VEC3 = [["1,2,3", "~[4,5,6]"]] * 20, "DataType=Vec3\nDataRate=100\n"
-# For each ending a function that returns the files of a small example, {name: bytes}, the first of
+# For each format a function that returns the files of a small example, {name: bytes}, the first of
 # which is read.
 EXAMPLES = {
-    ".bvh": lambda: {"a.bvh": body().encode()},
-    ".amc": lambda: {"a.amc": AMC.encode(), "a.asf": ASF.encode("latin-1")},
-    ".c3d": lambda: {"a.c3d": c3d(**everything())},
-    ".trc": lambda: {"a.trc": trc(tracks(gap=(3, 9)), ["LASI", "R Knee", "V_Sacral"]).encode()},
-    ".mot": lambda: {"a.mot": storage([[1.5, -2], [2, 0]] * 9, ["knee", "force_vx"]).encode()},
-    ".sto": lambda: {"a.sto": storage(VECTORS, ["pelvis", "torso"], header=VEC3).encode()},
+    "bvh": lambda: {"a.bvh": body().encode()},
+    "amc": lambda: {"a.amc": AMC.encode(), "a.asf": ASF.encode("latin-1")},
+    "c3d": lambda: {"a.c3d": c3d(**everything())},
+    "trc": lambda: {"a.trc": trc(tracks(gap=(3, 9)), ["LASI", "R Knee", "V_Sacral"]).encode()},
+    "mot": lambda: {"a.mot": storage([[1.5, -2], [2, 0]] * 9, ["knee", "force_vx"]).encode()},
+    "sto": lambda: {"a.sto": storage(VECTORS, ["pelvis", "torso"], header=VEC3).encode()},
 }

@@ -24,6 +24,7 @@ def test_columns_and_times_are_read(tmp_path):
     np.testing.assert_array_equal(df, VALUES)
     facts = {"format": "mot", "kind": "coordinates", "units": None, "up": None}
     facts |= {"frame_rate": 100.0, "channels": LABELS, "first_time": 0.0}
+    facts["report"] = "50 frames of 3 channels (coordinates) at 100 Hz."
     assert df.attrs == facts | {"trial": "a", "levels": ["recording", "frame"]}
     assert LinearSynchronizer(n_frames=9).fit_transform([df, df]).shape == (2, 9, 3)
 

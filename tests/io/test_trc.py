@@ -21,6 +21,7 @@ def test_positions_and_attrs_are_read(tmp_path):
     facts = {"format": "trc", "kind": "markers", "units": "mm", "up": None, "frame_rate": 50.0}
     facts |= {"joints": NAMES, "parents": [-1] * 3, "first_frame": 1, "first_time": 0.0}
     facts |= {"trial": "a", "levels": ["recording", "frame"]}
+    facts["report"] = "40 frames of 3 joints (markers) at 50 Hz in mm."
     assert df.attrs == facts
     assert read(tmp_path, trc(tracks(), NAMES, units="m")).attrs["units"] == "m"
 
