@@ -346,8 +346,8 @@ def _read_several(paths, columns, options):
             refused.append(error)
     if not recordings:
         raise refused[0] if refused else ValueError("There are no files to read, got none.")
-    for error in refused:
-        warnings.warn(f"{error} The file is left out.", UserWarning, stacklevel=3)
+    for reason in refused:
+        warnings.warn(f"{reason} The file is left out.", UserWarning, stacklevel=3)
     return _keep_common(recordings) if columns else recordings
 
 
