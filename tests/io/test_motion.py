@@ -124,7 +124,7 @@ def test_joints_of_no_recording_are_refused(tmp_path, ending):
 def test_unknown_ending_is_an_error_that_lists_the_known_ones(tmp_path):
     for name, ending in (("a.unknown", ".unknown"), ("a", ""), ("a.asf", ".asf")):
         path = put(tmp_path, "", name)
-        with pytest.raises(ValueError, match="no reader is for.*; the known endings") as caught:
+        with pytest.raises(ValueError, match=r"no reader is for.*; the known endings") as caught:
             read_motion(path)
         message = str(caught.value)
         assert message.startswith(f"{path} ends with {ending!r}")
