@@ -17,6 +17,7 @@ from importlib import import_module
 from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
 from .body.skeleton import Skeleton
+from .inputs.findings import TrialWarning, check_trials, mend_trials
 from .inputs.long_tables import to_frame, to_trials
 from .model.action_model import ActionModel
 from .model.detector import ActionDetector
@@ -46,6 +47,9 @@ __all__ = [
     "Skeleton",
     "SynchronizationWarning",
     "TimingChannel",
+    "TrialWarning",
+    "check_trials",
+    "mend_trials",
     "to_frame",
     "to_trials",
 ]

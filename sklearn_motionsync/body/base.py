@@ -15,7 +15,7 @@ from ..inputs.numbers import column_names
 from ..inputs.types import NamesLike, Transformed, TrialsLike
 from ..inputs.validation import (
     TrialTransformerMixin,
-    check_trials,
+    check_input,
     names_of_input,
     restore,
 )
@@ -344,7 +344,7 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin
 
     def _check(self, X, *, reset):
         finite = self._finite
-        trials = check_trials(self, X, reset=reset, level="pose", finite=finite)
+        trials = check_input(self, X, reset=reset, level="pose", finite=finite)
         skeleton = self.skeleton
         # Tables have their columns in the order of fit; if it had none, in that of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X

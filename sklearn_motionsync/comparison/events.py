@@ -18,7 +18,7 @@ from ..inputs.types import (
     Unit,
     ValuesLike,
 )
-from ..inputs.validation import SequenceLevelMixin, check_trials
+from ..inputs.validation import SequenceLevelMixin, check_input
 from ..io.events import is_table_of_events, keyframes_from_events
 from ..synchronizers.match import check_unit
 from ..utils.parallel import Progress
@@ -149,7 +149,7 @@ def _times_of_events(X, events, unit, frame_rate):
     if events is None or is_table_of_events(events):
         events = keyframes_from_events(X, events, frame_rate=frame_rate)
     reader = type("compare_events", (SequenceLevelMixin, BaseEstimator), {})()
-    trials = check_trials(reader, X, reset=True, level="sequence", finite="allow-nan")
+    trials = check_input(reader, X, reset=True, level="sequence", finite="allow-nan")
     facts = TrialFacts.of(X, frame_rate, checked=trials)
     n, last, scale = len(trials), facts.lengths[:, np.newaxis] - 1, 1.0
     frames = Keyframes(events, n, name="events").known(trials) * last

@@ -15,6 +15,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .collections import ACCEPTED, NOT_ONE, Trials, as_collection, check_members
 from .facts import check_facts, facts_of
+from .findings import warn_of_findings
 from .numbers import (
     FLOATS,
     as_numbers,
@@ -31,13 +32,12 @@ from .wording import counted
 __all__ = [
     "SequenceLevelMixin",
     "TrialTransformerMixin",
+    "check_input",
     "check_transformed",
-    "check_trials",
     "names_of_input",
     "read_collection",
     "read_source",
     "restore",
-    "warn_of_clocks",
 ]
 
 # Attribute of estimators: ``feature_names_in_``, but of any type.
@@ -91,7 +91,7 @@ class SequenceLevelMixin:
             same = X.names is getattr(self, "feature_names_in_", None)
             if same and X[0].shape[not on_rows] == self.n_features_in_:
                 return X
-        return check_trials(
+        return check_input(
             self, X, reset=False, level="sequence", on_rows=on_rows, finite=self._finite
         )
 
@@ -106,12 +106,12 @@ class SequenceLevelMixin:
 
     def _check_training_set(self, X, numbers=None):
         """Check the input of ``fit``: all trials, or some with their numbers."""
-        trials = check_trials(
+        trials = check_input(
             self, X, reset=True, level="sequence", numbers=numbers, finite=self._finite
         )
         self._fitted_on_rows = trials.kind == "rows"
         if not self._fitted_on_rows:
-            warn_of_clocks(trials, names_of_input(self))
+            warn_of_findings(trials, names_of_input(self))
         return trials
 
 
@@ -138,7 +138,7 @@ class TrialTransformerMixin(TransformerMixin):
         return super().fit_transform(X, y, **fit_params)
 
 
-def check_trials(
+def check_input(
     estimator,
     X,
     *,
@@ -244,7 +244,7 @@ def check_transformed(estimator, X, names, *, finite=True):
     named = column_names(first)
     if named is not None and isinstance(named[0], str):
         space.feature_names_in_ = np.asarray(names, dtype=object)
-    return check_trials(space, X, reset=False, level="pose", finite=finite)
+    return check_input(space, X, reset=False, level="pose", finite=finite)
 
 
 def restore(estimator, trials, arrays, *, frames=None, columns=None):
@@ -391,29 +391,6 @@ def _smoothness(arrays):
     return steps[0] / steps[1] if min(steps) > 0 else np.nan
 
 
-def warn_of_clocks(trials, names):
-    """Warn of a feature, one of several, that only counts the time."""
-    n_features = trials[0].shape[1]
-    if n_features == 1 or min(map(len, trials)) < _CLOCK_FRAMES:
-        return
-    clocks = np.ones(n_features, dtype=bool)
-    for x in trials:
-        step = (x[-1] - x[0]) / (len(x) - 1)
-        line = x[0] + step * np.arange(len(x))[:, np.newaxis]
-        # On a straight line, within half a step: times are rounded.
-        clocks &= (np.diff(x, axis=0) > 0).all(axis=0) & (np.abs(x - line) <= step / 2).all(axis=0)
-        if not clocks.any():
-            return
-    for k in np.flatnonzero(clocks):
-        name = k if names is None else repr(names[k])
-        warnings.warn(
-            f"Feature {name} increases evenly in every trial: it is a clock, not a movement, "
-            "and is matched like one. Leave it out, or give it as time= to to_trials.",
-            UserWarning,
-            stacklevel=2,
-        )
-
-
 # -- trials that are read in parts, so that few are in memory at a time ---------------
 
 # Bytes of a number, at most.
@@ -441,7 +418,7 @@ def read_source(estimator, source, on_rows):
             continue
         if dtype is None:
             dtype = as_numbers(portion[0], "Trial 0").dtype
-        yield check_trials(
+        yield check_input(
             estimator,
             portion,
             reset=False,

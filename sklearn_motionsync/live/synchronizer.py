@@ -13,7 +13,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..inputs.facts import TIMELESS
 from ..inputs.numbers import check_magnitude
 from ..inputs.types import Indexed, NumbersLike, SupportsArray, TrialsLike, ValuesLike
-from ..inputs.validation import SequenceLevelMixin, check_trials, names_of_input
+from ..inputs.validation import SequenceLevelMixin, check_input, names_of_input
 from ..inputs.wording import counted
 from ..matching.costs import step_table
 from ..matching.counting import first_largest
@@ -358,7 +358,7 @@ class OnlineSynchronizer(
             As from ``step``; or if there are not as many times as trials.
         """
         check_is_fitted(self, "mean_")
-        trials = check_trials(
+        trials = check_input(
             self,
             X,
             reset=False,

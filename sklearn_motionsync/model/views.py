@@ -14,7 +14,7 @@ from ..body.limbs import LIMB_NAMES, limb_indices, unit_vectors
 from ..inputs.collections import Trials, as_collection
 from ..inputs.features import as_features, names_of_features
 from ..inputs.trial_facts import TrialFacts
-from ..inputs.validation import check_trials
+from ..inputs.validation import check_input
 from ..matching.counting import first_largest
 from ..synchronizers.match import Match
 from ..transformers.aspace import ASpace
@@ -293,7 +293,7 @@ class _Route(NamedTuple):
             for step in self.before:
                 points = _through(step, points, params, matches, X, known)
             if self.aspace is not None:
-                whole = check_trials(
+                whole = check_input(
                     self.aspace, points, reset=False, level="pose", finite="allow-nan"
                 )
                 points = self.aspace.transform(points)

@@ -16,7 +16,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._param_validation import Interval, StrOptions
 
 from ..inputs.types import Cost, TrialsLike
-from ..inputs.validation import SequenceLevelMixin, check_trials
+from ..inputs.validation import SequenceLevelMixin, check_input
 from ..inputs.wording import counted
 from ..matching.costs import COSTS
 from ..matching.matcher import cost_features
@@ -152,10 +152,10 @@ def synchronization_distances(
     ['slow', 'fast', 'fast']
     """
     reader = type("synchronization_distances", (SequenceLevelMixin, BaseEstimator), {})()
-    bases, moving = check_trials(reader, X, reset=True, level="sequence"), None
+    bases, moving = check_input(reader, X, reset=True, level="sequence"), None
     if Y is not None:
         on_rows = bases.kind == "rows"
-        moving = check_trials(reader, Y, reset=False, level="sequence", on_rows=on_rows)
+        moving = check_input(reader, Y, reset=False, level="sequence", on_rows=on_rows)
     comparison = PairwiseDistance(
         cost,
         normalize=normalize,

@@ -22,9 +22,10 @@ from ..gait.recordings import FOOT_STRIKE, Recordings
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.findings import warn_of_findings
 from ..inputs.resampling import as_frame_rates
 from ..inputs.types import TrialsLike, ValuesLike
-from ..inputs.validation import check_trials, names_of_input, warn_of_clocks
+from ..inputs.validation import check_input, names_of_input
 from ..matching.counting import ROUNDING, first_largest, whole
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
@@ -489,9 +490,9 @@ def check_takes(segmenter, X, *, reset):
     X = as_takes(X)
     # A period is that of its take, at any frame rate.
     facts = TIMELESS if segmenter.period is None else None
-    takes = check_trials(segmenter, X, reset=reset, level="sequence", facts=facts)
+    takes = check_input(segmenter, X, reset=reset, level="sequence", facts=facts)
     if reset:
-        warn_of_clocks(takes, names_of_input(segmenter))
+        warn_of_findings(takes, names_of_input(segmenter))
     return as_collection(X), takes
 
 

@@ -20,7 +20,7 @@ from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.resampling import as_frame_rates
 from ..inputs.tables import FRAME, as_pandas
 from ..inputs.types import Labels, TrialLike, TrialsLike, ValuesLike
-from ..inputs.validation import SequenceLevelMixin, check_trials
+from ..inputs.validation import SequenceLevelMixin, check_input
 from ..inputs.wording import counted, within
 from ..matching.counting import first_largest, whole
 from ..matching.matcher import Features
@@ -178,7 +178,7 @@ def find_trials(
     """
     X = as_takes(X, univariate=True)
     checker = type("find_trials", (SequenceLevelMixin, BaseEstimator), {})()
-    checked = check_trials(checker, X, reset=True, level="sequence", facts=())
+    checked = check_input(checker, X, reset=True, level="sequence", facts=())
     searched, paces, is_rate_known = _at_rate_of(pattern, X, checked, frame_rate, pattern_rate)
     synchronizer, takes, codes = _reach(pattern, searched, groups)
     _check_lengths(checked if searched is X else searched, takes, checked.called)

@@ -17,8 +17,8 @@ from ..inputs.features import check_input_features
 from ..inputs.types import NamesLike, Transformed, TrialsLike
 from ..inputs.validation import (
     TrialTransformerMixin,
+    check_input,
     check_transformed,
-    check_trials,
     restore,
 )
 from ..inputs.wording import counted
@@ -164,7 +164,7 @@ class ASpace(
             If a feature was seen in fewer poses than there are features: too few to learn how it
             depends on the others.
         """
-        arrays = check_trials(self, X, reset=True, level="pose", finite="allow-nan")
+        arrays = check_input(self, X, reset=True, level="pose", finite="allow-nan")
         poses = np.concatenate(arrays)
         has_gaps = is_gappy(poses)
         if len(poses) < 2:
@@ -213,7 +213,7 @@ class ASpace(
             ``set_output(transform="pandas")``. NaN where nothing of a pose was seen.
         """
         check_is_fitted(self, "components_")
-        trials = check_trials(self, X, reset=False, level="pose", finite="allow-nan")
+        trials = check_input(self, X, reset=False, level="pose", finite="allow-nan")
         components, timed = self.components_.T, trials.kind != "rows"
         arrays = []
         for a in trials:

@@ -18,8 +18,8 @@ from ..inputs.numbers import as_numbers, column_names
 from ..inputs.types import NamesLike, Transformed, TrialsLike
 from ..inputs.validation import (
     TrialTransformerMixin,
+    check_input,
     check_transformed,
-    check_trials,
     restore,
 )
 from ..utils.doc_links import DocumentedMixin
@@ -111,7 +111,7 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstim
             If the input breaks the contract, the transformer needs a ``y``, or its output is not a
             row of numbers a frame.
         """
-        trials = check_trials(self, X, reset=True, level="pose", finite=self._finite())
+        trials = check_input(self, X, reset=True, level="pose", finite=self._finite())
         transformer, name = clone(self.transformer), "fitting the transformer"
         with self._progress(fits=True) as progress, progress.fitting(transformer, name):
             transformer.fit(self._named(np.concatenate(trials)))
@@ -140,7 +140,7 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstim
             ``set_output(transform="pandas")``.
         """
         check_is_fitted(self, "transformer_")
-        trials = check_trials(self, X, reset=False, level="pose", finite=self._finite())
+        trials = check_input(self, X, reset=False, level="pose", finite=self._finite())
         arrays = [
             self._as_rows(self.transformer_.transform(self._named(x)), trials, i)
             for i, x in enumerate(trials)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import LinearSynchronizer, to_frame, to_trials
-from sklearn_motionsync.inputs.validation import check_trials
+from sklearn_motionsync.inputs.validation import check_input
 from sklearn_motionsync.takes.cutting import cut_takes
 
 ROWS = pd.DataFrame(
@@ -14,7 +14,7 @@ TAKES = [np.arange(12.0).reshape(6, 2), np.arange(20, dtype=np.float32).reshape(
 
 
 def cut(X):
-    takes = check_trials(LinearSynchronizer(), X, reset=True, level="sequence")
+    takes = check_input(LinearSynchronizer(), X, reset=True, level="sequence")
     return cut_takes(X, takes, ROWS)
 
 
@@ -71,7 +71,7 @@ def test_trials_are_labelled_by_their_take():
 
 
 def test_no_rows_give_no_trials():
-    takes = check_trials(LinearSynchronizer(), TAKES, reset=True, level="sequence")
+    takes = check_input(LinearSynchronizer(), TAKES, reset=True, level="sequence")
     parts, locations = cut_takes(TAKES, takes, ROWS[:0])
     assert parts == []
     assert list(locations.columns) == list(ROWS.columns)

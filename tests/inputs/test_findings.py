@@ -1,0 +1,218 @@
+"""What numbers of trials mean: made faults are found and mended, and untouched trials have none."""
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+from sklearn_motionsync import (
+    DenseSynchronizer,
+    LinearSynchronizer,
+    TrialWarning,
+    check_trials,
+    mend_trials,
+)
+from sklearn_motionsync.datasets import load_trials, make_bending, make_gait, make_walk
+
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
+GAIT = [np.asarray(x) for x in make_gait(timing=6, random_state=0).data]
+BENDS = [np.asarray(x) for x in make_bending(8, random_state=0).data]
+
+
+def beside(column):
+    """The angles of gait with one column more, a function of the frame's share and the trial."""
+    shares = [np.linspace(0, 1, len(x)) for x in GAIT]
+    return [
+        np.column_stack([x, column(t, i)])
+        for i, (x, t) in enumerate(zip(GAIT, shares, strict=True))
+    ]
+
+
+def yaw(t, i):
+    return (170 + (25 + i % 3) * np.sin(np.pi * t) + 180) % 360 - 180
+
+
+def quaternion(t, i):
+    turns = np.column_stack([0.5 * np.sin(3 * t), 0.3 * np.cos(2 * t + 0.1 * i), 1.5 + t])
+    return Rotation.from_rotvec(turns).as_quat() * np.where(t > 0.4, -1, 1)[:, np.newaxis]
+
+
+def with_one(trials, i, change):
+    return [change(x.copy()) if k == i else x for k, x in enumerate(trials)]
+
+
+def hidden(x):
+    x[20:30, 3:6] = 0
+    return x
+
+
+def frozen(x):
+    x[20:35] = x[20]
+    return x
+
+
+WIDTH = GAIT[0].shape[1]
+# Kind, trials, and what the row says of it.
+MADE = {
+    "wrapping": (beside(yaw), {"feature": WIDTH, "value": 360, "n_trials": len(GAIT)}),
+    "wrapping in radians": (
+        beside(lambda t, i: np.deg2rad(yaw(t, i))),
+        {"kind": "wrapping", "feature": WIDTH, "value": 2 * np.pi},
+    ),
+    "quaternion": (beside(quaternion), {"feature": WIDTH, "n_trials": len(GAIT)}),
+    "quality": (
+        [
+            pd.DataFrame(x).rename(columns=str).rename(columns={str(WIDTH): "nose_likelihood"})
+            for x in beside(lambda t, i: 0.8 + 0.2 * np.sin(9 * t + i))
+        ],
+        {"feature": "nose_likelihood"},
+    ),
+    "fill value": (with_one(BENDS, 2, hidden), {"trial": 2, "first": 20, "last": 29, "value": 0}),
+    "clock": (beside(lambda t, i: t), {"feature": WIDTH}),
+    "constant": (beside(lambda t, i: 0 * t + 3), {"feature": WIDTH}),
+    "zeros at the end": (
+        with_one(GAIT, 4, lambda x: np.vstack([x, np.zeros((9, WIDTH))])),
+        {"trial": 4, "first": len(GAIT[4]), "last": len(GAIT[4]) + 8},
+    ),
+    "missing at the end": (
+        with_one(GAIT, 4, lambda x: np.vstack([x, np.full((9, WIDTH), np.nan)])),
+        {"trial": 4, "first": len(GAIT[4])},
+    ),
+    "held at the end": (
+        with_one(GAIT, 4, lambda x: np.vstack([x, np.repeat(x[-1:], 9, axis=0)])),
+        {"trial": 4, "first": len(GAIT[4]), "last": len(GAIT[4]) + 8},
+    ),
+    "frozen": (with_one(GAIT, 1, frozen), {"trial": 1, "first": 21, "last": 34}),
+    "factor": (with_one(BENDS, 3, lambda x: 1000 * x), {"trial": 3, "value": 1000}),
+    "factor of angles": (
+        with_one(GAIT, 3, np.deg2rad), {"kind": "factor", "trial": 3, "value": 57.3},
+    ),
+    "exchanged axes": (
+        with_one(BENDS, 5, lambda x: x.reshape(len(x), -1, 3)[..., [0, 2, 1]].reshape(len(x), -1)),
+        {"trial": 5},
+    ),
+    "other rate": (with_one(GAIT, 6, lambda x: np.repeat(x, 4, axis=0)), {"trial": 6, "value": 4}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_made_fault_is_the_only_finding(name):
+    trials, expected = MADE[name]
+    table = check_trials(trials)
+    kind = expected.get("kind", name)
+    assert set(table["kind"]) == {kind}
+    row = table.iloc[0]
+    for key, value in expected.items():
+        assert row[key] == pytest.approx(value, rel=0.02) if key == "value" else row[key] == value
+    # What mends it is a line that can be run, or says what to do.
+    assert row["why"]
+    assert row["mend"]
+    assert "{" not in row["mend"]
+
+
+@pytest.mark.parametrize(
+    "trials",
+    [GAIT, BENDS, [np.asarray(x) for x in make_walk(4, random_state=0).data]],
+    ids=["gait", "bending", "walk"],
+)
+def test_nothing_of_made_movement(trials):
+    assert check_trials(trials).empty
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="no recordings of people beside the checkout")
+@pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
+def test_recordings_of_people_have_few_findings(name):
+    """The end of one clip repeats its pose in the file; nothing else is found."""
+    bunch = load_trials(SHARED / f"{name}_positions.npz")
+    kinds = []
+    for label in np.unique(bunch.target):
+        trials = [
+            np.asarray(x) for x, y in zip(bunch.data, bunch.target, strict=True) if y == label
+        ]
+        kinds += check_trials(trials)["kind"].tolist()
+    assert kinds == ["held at the end"] * (name == "hdm05/hdm05")
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="no recordings of people beside the checkout")
+def test_markers_at_zero_in_a_public_set_are_fill_values():
+    """UI-PRMD writes 0, 0, 0 for a marker that was not seen; what is found is nothing else."""
+    with np.load(SHARED / "uiprmd" / "uiprmd_odd_positions.npz") as z:
+        positions, offsets, labels = z["positions"], z["offsets"], z["label"]
+    squats = [
+        positions[offsets[i] : offsets[i + 1]] for i in np.flatnonzero(labels == "deep squat")
+    ]
+    table = check_trials([x.reshape(len(x), -1) for x in squats])
+    assert set(table["kind"]) == {"fill value"}
+    for _, row in table.iterrows():
+        joint = squats[row["trial"]][row["first"] : row["last"] + 1, row["feature"] // 3]
+        assert (joint == 0).all()
+
+
+@pytest.mark.parametrize("synchronizer", [LinearSynchronizer(51), DenseSynchronizer(51)])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("wrapping", rf"Feature {WIDTH} in trial 0, frame \d+: angles jump by 360, .* period=360"),
+        ("quaternion", rf"Feature {WIDTH} in trial 0.* sign of a quaternion"),
+        ("quality", "Feature 'nose_likelihood': values from 0 to 1 that are named"),
+        ("fill value", r"Features \[3, 4, 5\] in trial 2, frame 20: exactly 0"),
+        ("zeros at the end", r"Trial 4: all features are zero from frame \d+ on"),
+        ("factor of angles", r"Trial 3: about 57\.3 times .*degrees and radians"),
+    ],
+)
+def test_a_fit_warns_once(synchronizer, name, words):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        synchronizer.fit(MADE[name][0])
+    told = [str(each.message) for each in caught if issubclass(each.category, TrialWarning)]
+    assert len(told) == 1
+    assert re.match(words, told[0])
+    assert "check_trials(X)" in told[0]
+
+
+@pytest.mark.parametrize("name", ["wrapping", "quaternion", "fill value", "zeros at the end"])
+def test_what_was_mended_has_no_finding(name):
+    trials = MADE[name][0]
+    before = [np.array(x) for x in trials]
+    mended = mend_trials(trials, [name])
+    assert check_trials(mended).empty
+    for x, y in zip(trials, before, strict=True):
+        np.testing.assert_array_equal(x, y)
+    if name == "wrapping":
+        # On the circle nothing moved.
+        turns = np.concatenate([(a - b)[:, WIDTH] for a, b in zip(mended, trials, strict=True)])
+        np.testing.assert_allclose(turns / 360, np.rint(turns / 360), atol=1e-9)
+    if name == "quaternion":
+        for a, b in zip(mended, trials, strict=True):
+            np.testing.assert_allclose(
+                Rotation.from_quat(a[:, WIDTH:]).as_matrix(),
+                Rotation.from_quat(b[:, WIDTH:]).as_matrix(),
+                atol=1e-12,
+            )
+    if name == "fill value":
+        assert np.isnan(mended[2][20:30, 3:6]).all()
+    if name == "zeros at the end":
+        np.testing.assert_array_equal(mended[4], GAIT[4])
+
+
+def test_means_of_mended_angles_are_those_of_angles_that_do_not_wrap():
+    aligned = DenseSynchronizer(51).fit_transform(mend_trials(MADE["wrapping"][0]))
+    truth = DenseSynchronizer(51).fit_transform(
+        beside(lambda t, i: 170 + (25 + i % 3) * np.sin(np.pi * t))
+    )
+    np.testing.assert_allclose((aligned - truth)[..., WIDTH] % 360 % 359.999, 0, atol=1e-3)
+
+
+def test_tables_stay_tables_with_their_attrs():
+    tables = [pd.DataFrame(x) for x in MADE["wrapping"][0]]
+    tables[0].attrs["frame_rate"] = 100.0
+    mended = mend_trials(tables)
+    assert mended[0].attrs == {"frame_rate": 100.0}
+    assert mended[0].columns.equals(tables[0].columns)
+    with pytest.raises(ValueError, match=r"kinds are \['fill value', 'wrapping', .*got 'all'"):
+        mend_trials(tables, "all")
+    with pytest.raises(ValueError, match="Wrap one trial as"):
+        check_trials(np.zeros((9, 3)))
