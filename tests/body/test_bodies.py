@@ -49,13 +49,6 @@ def test_features_do_not_depend_on_the_unit(made, recording, dtype, factor):
     np.testing.assert_allclose(far, near, atol=1e-5 if dtype == "f4" else 1e-9)
 
 
-def test_transform_of_one_trial_equals_that_of_several(made, bends):
-    fitted = made(bends.skeleton).fit(bends.data)
-    for x, together in zip(bends.data[:4], fitted.transform(bends.data), strict=False):
-        np.testing.assert_array_equal(fitted.transform([x])[0], together)
-        np.testing.assert_array_equal(fitted.transform(x), together)
-
-
 def with_ankle_at_knee(positions, factor=1.0):
     X = positions.copy()
     knee, ankle = (3 * PAPER.index_of(f"left_{joint}") for joint in ("knee", "ankle"))
@@ -89,20 +82,6 @@ def test_wrong_width_is_refused(made):
 
 
 # -- which way is up ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("axes", [(1, -1, -1), (1, -1, 1)])
-def test_body_upside_down_is_refused_with_its_trial(made, recording, axes):
-    estimator, down = made(), turned_over(recording, axes)
-    message = r"Trial 1 is upside down.* says that 'y' is up, but '-y' seems to be\. Turn"
-    with pytest.raises(ValueError, match=message):
-        estimator.fit([recording, down])
-    with pytest.raises(ValueError, match=message):
-        estimator.fit([recording]).transform([recording, down])
-    with pytest.raises(ValueError, match="Trial 0 is upside down"):
-        estimator.transform(down)
-    with pytest.raises(ValueError, match=r"Trial 1 \('b'\) is upside down"):
-        estimator.transform(to_frame([recording, down], trials=["a", "b"]))
 
 
 def test_random_points_are_not_taken_for_a_body_upside_down(made):

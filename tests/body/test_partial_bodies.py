@@ -109,18 +109,6 @@ def test_poses_of_reconstructed_positions_are_the_same(people, part, reference):
         np.testing.assert_allclose(again["pelvis_height"], poses["pelvis_height"], atol=1e-5)
 
 
-def test_body_is_the_skeleton_of_the_landmarks():
-    for skeleton in (PAPER, Skeleton.acclaim(), Skeleton.kinect(), Skeleton.mediapipe()):
-        assert skeleton.body() == PAPER
-    assert Skeleton.coco(n_dims=2).body() == Skeleton.paper(n_dims=2)
-    legs = only(LEGS).body()
-    assert legs.joints == tuple(j for j in PAPER.joints if j in LEGS)
-    parent = {j: legs.joints[p] for j, p in zip(legs.joints, legs.parents, strict=True) if p >= 0}
-    assert parent["left_hip"] == "pelvis"
-    assert parent["left_knee"] == "left_hip"
-    assert repr(legs) == "Skeleton(<7 joints, 7 of 15 landmarks>, up='y')"
-
-
 # -- places of the landmarks that are there -----------------------------------------------
 
 
@@ -200,23 +188,12 @@ def test_missing_pelvis_and_neck_are_the_middle_of_their_pairs():
     assert "pelvis" not in Skeleton.from_frame(df, landmarks={"pelvis": None}).landmarks
 
 
-def test_tuple_of_one_joint_is_that_joint():
-    assert Skeleton(PAPER.joints, PAPER.parents, {**PAPER.landmarks, "head": ["head"]}) == PAPER
-
-
 # -- guessed from names -------------------------------------------------------------------
 
 
 def without(*joints):
     x = make_bending(1, random_state=1).data[0]
     return columns_of(x).drop(columns=[f"{j}_{a}" for j in joints for a in "xyz"])
-
-
-def test_both_sides_of_a_part_may_be_missing():
-    for gone in (["head"], ["left_wrist", "right_wrist"], [j for j in PAPER.joints if j in ARMS]):
-        skeleton = Skeleton.from_frame(without(*gone))
-        assert set(skeleton.landmarks) == set(PAPER.joints) - set(gone)
-        assert len(DirectionCosines(skeleton).fit_transform(without(*gone)))
 
 
 def test_landmark_guessed_on_one_side_only_is_refused():

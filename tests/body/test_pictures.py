@@ -3,11 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
-    DenseSynchronizer,
     DirectionCosines,
     JointPositions,
     Skeleton,
@@ -136,12 +132,3 @@ def test_two_axes_are_read_from_the_columns():
     table = columns_of(picture_of(x), PLANE)
     with pytest.raises(ValueError, match="column 0 is 'pelvis_y', where the skeleton has"):
         DirectionCosines(PLANE).fit(table[[*table.columns[1::-1], *table.columns[2:]]])
-
-
-def test_pipeline_of_key_points(people):
-    seen = [picture_of(x) for x in people]
-    steps = DirectionCosines(PLANE), ASpace(4), DenseSynchronizer(40), ActionModel()
-    pipe = make_pipeline(*steps).fit(seen)
-    assert pipe[-1].mean_.shape == (40, 4)
-    assert pipe[:2].inverse_transform(pipe[-1].mean_).shape == (40, 30)
-    assert pipe.predict(seen).shape == (4,)

@@ -147,13 +147,6 @@ def test_skeleton_refuses_wrong_arguments(arguments, message):
         Skeleton(*arguments)
 
 
-def test_parents_may_be_integers_of_any_type():
-    for parents in (np.array(PAPER.parents), np.array(PAPER.parents, float), iter(PAPER.parents)):
-        skeleton = Skeleton(np.array(PAPER.joints), parents)
-        assert skeleton == PAPER
-        assert {type(p) for p in skeleton.parents} == {int}
-
-
 def test_from_frame_refuses_wrong_arguments():
     for given in (np.zeros((2, 45)), [[0.0] * 45], None, pd.Series([0.0])):
         with pytest.raises(ValueError, match=r"columns of a DataFrame, got \w+\. Use pd.DataFrame"):

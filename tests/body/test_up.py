@@ -168,8 +168,3 @@ def test_parts_of_people_are_accepted_and_upside_down_refused(real_data, name):
         for x in bunch.data[::3] if all_tell else bunch.data[:1]:
             with pytest.raises(ValueError, match="upside down"):
                 fitted.transform([turned_over(x)])
-
-
-def test_arms_alone_may_have_any_orientation(recording):
-    arms = [f"{side}_{j}" for side in ("left", "right") for j in ("shoulder", "elbow", "wrist")]
-    DirectionCosines(with_up("y", landmarks=arms)).fit([turned_over(recording)])
