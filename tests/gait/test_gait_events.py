@@ -58,17 +58,6 @@ def test_events_of_made_walks(ruler, how, bias, error):
         assert np.abs(by_label[label]).mean() < error, label
 
 
-@pytest.mark.parametrize(
-    ("left_out", "most"), [(["heel"], 15), (["toe"], 10), (["heel", "toe"], 40)]
-)
-def test_without_heels_or_toes(walk, ruler, left_out, most):
-    named = {f"{side}_{end}": None for side in ("left", "right") for end in left_out}
-    found = gait_events(walk.data, walk.skeleton, feet=named, frame_rate=100)
-    by_label, missed, more = errors(walk, found, ruler)
-    assert (missed, more) == (0, 0)
-    assert all(np.abs(of_label).mean() < most for of_label in by_label.values())
-
-
 def test_side_view_from_a_camera(walk, ruler):
     """Two axes, y down, pixels; the camera sees the walk from the other side, too."""
     for sign in (1, -1):
@@ -102,86 +91,6 @@ def test_units_place_and_axes_do_not_matter(walk):
     pd.testing.assert_frame_equal(found, expected, rtol=1e-6)
 
 
-def test_recording_that_turns_around(walk, ruler):
-    """The way bends by a half circle; events stay where they are."""
-    (x,) = walk.data[:1]
-    points = x.reshape(len(x), -1, 3).copy()
-    pelvis = points[:, :1] * [1, 0, 1]
-    angles = np.linspace(0, np.pi, len(x))
-    cosine, sine = np.cos(angles), np.sin(angles)
-    zero, one = np.zeros_like(cosine), np.ones_like(cosine)
-    turns = np.array([[cosine, zero, sine], [zero, one, zero], [-sine, zero, cosine]])
-    local = np.einsum("ijt,tkj->tki", turns, points - pelvis)
-    steps = np.diff(pelvis, axis=0, prepend=pelvis[:1])
-    way = np.cumsum(np.einsum("ijt,tkj->tki", turns, steps), axis=0)
-    found = gait_events([(local + way).reshape(len(x), -1)], walk.skeleton, frame_rate=100)
-    one_walk = {"events": walk.events[:1]}
-    by_label, missed, more = errors(type(walk)(**one_walk), found, ruler)
-    assert (missed, more) == (0, 0)
-    assert all(np.abs(of_label).mean() < 20 for of_label in by_label.values())
-
-
-def test_walking_backwards(ruler):
-    """Played backwards, a foot strikes where it left the ground; on a treadmill, too."""
-    for treadmill in (False, True):
-        walk = make_walk(2, treadmill=treadmill, random_state=0)
-        other = dict(zip(LABELS, reversed(LABELS), strict=True))
-        lasts = [(len(x) - 1) / 100 for x in walk.data]
-        events = [
-            [e | {"label": other[e["label"]], "time": last - e["time"]} for e in own]
-            for last, own in zip(lasts, walk.events, strict=True)
-        ]
-        found = gait_events([x[::-1] for x in walk.data], walk.skeleton, frame_rate=100)
-        by_label, missed, more = errors(type(walk)(events=events), found, ruler)
-        assert (missed, more) == (0, 0)
-        assert all(np.abs(of_label).mean() < 50 for of_label in by_label.values())
-
-
-def test_exchanged_names_of_hips_do_not_matter(walk):
-    joints = list(walk.skeleton.joints)
-    for part in ("hip", "shoulder"):
-        a, b = joints.index(f"left_{part}"), joints.index(f"right_{part}")
-        joints[a], joints[b] = joints[b], joints[a]
-    wrong = Skeleton(joints, walk.skeleton.parents, dict(walk.skeleton.landmarks))
-    found, expected = (gait_events(walk.data, s, frame_rate=100) for s in (wrong, walk.skeleton))
-    pd.testing.assert_frame_equal(found, expected)
-
-
-def test_legs_without_hips_and_toes(walk, ruler):
-    """The way is the line on which the feet come apart."""
-    landmarks = {"pelvis": "pelvis"} | {
-        f"{side}_{part}": f"{side}_{part}"
-        for side in ("left", "right")
-        for part in ("knee", "ankle")
-    }
-    bare = Skeleton(walk.skeleton.joints, walk.skeleton.parents, landmarks)
-    feet = {"left_toe": None, "right_toe": None}
-    found = gait_events(walk.data, bare, feet=feet, frame_rate=100)
-    by_label, missed, more = errors(walk, found, ruler)
-    assert (missed, more) == (0, 0)
-    assert all(np.abs(of_label).mean() < 10 for of_label in by_label.values())
-
-
-def test_gaps(walk, ruler):
-    """Short gaps are filled. Of a long one the events are left out, and no other."""
-    (x,), skeleton = walk.data[:1], walk.skeleton
-    whole = gait_events([x], skeleton, frame_rate=100)
-    short, long = x.copy(), x.copy()
-    column = 3 * skeleton.joints.index("left_heel")
-    short[200:210, column : column + 3] = np.nan
-    long[200:320, column : column + 3] = np.nan
-    found = gait_events([short], skeleton, frame_rate=100)
-    assert np.abs(found["frame"] - whole["frame"]).max() < 2
-    found = gait_events([long], skeleton, frame_rate=100)
-    left = found[(found["context"] == "Left") & (found["label"] == "Foot Strike")]["frame"]
-    assert not left.between(200, 319).any()
-    outside = whole[(whole["context"] == "Left") & (whole["label"] == "Foot Strike")]["frame"]
-    outside = outside[~outside.between(180, 340)]
-    assert all(np.abs(left - at).min() < 3 for at in outside)
-    right = [table[table["context"] == "Right"]["frame"].to_numpy() for table in (found, whole)]
-    np.testing.assert_allclose(*right, atol=3)
-
-
 def test_heading_across_a_gap_of_the_hips(walk):
     """Straight lines lead across it; curves that swing out would turn the body."""
     x = walk.data[0].reshape(len(walk.data[0]), -1, 3).copy()
@@ -192,30 +101,6 @@ def test_heading_across_a_gap_of_the_hips(walk):
     hidden = Walk(x, walk.skeleton, feet, 100, "walk").forward
     turned = np.degrees(np.arccos(np.clip((whole * hidden).sum(axis=1), -1, 1)))
     assert turned.max() < 1
-
-
-@pytest.mark.parametrize("hidden", [["front"], ["front", "back"], ["middle"]])
-def test_a_hidden_marker_of_the_pelvis(walk, hidden):
-    """The others carry it along; a marker that is never seen is left out."""
-    x = walk.data[0].reshape(len(walk.data[0]), -1, 3)
-    hips = [walk.skeleton.joints.index(f"{side}_hip") for side in ("left", "right")]
-    middle, across = x[:, hips].mean(axis=1), np.diff(x[:, hips], axis=1)[:, 0]
-    ahead = 0.7 * np.cross([0, 1, 0], across)
-    markers = {"front": middle + ahead + across / 2, "back": middle - ahead, "middle": middle}
-    n = len(x)
-    for name in hidden:
-        markers[name] = markers[name].copy()
-        markers[name][n // 3 : None if name == "middle" else 2 * n // 3] = np.nan
-        if name == "middle":
-            markers[name][:] = np.nan
-    points = np.concatenate([x, np.stack(list(markers.values()), axis=1)], axis=1)
-    joints = [*walk.skeleton.joints, *markers]
-    landmarks = dict(walk.skeleton.landmarks) | {"pelvis": tuple(markers)}
-    body = Skeleton(joints, [-1] * len(joints), landmarks)
-    found = gait_events([points.reshape(n, -1)], body, frame_rate=100)
-    whole = gait_events(walk.data[:1], walk.skeleton, frame_rate=100)
-    assert found[["label", "context"]].equals(whole[["label", "context"]])
-    np.testing.assert_allclose(found["time"], whole["time"], atol=0.03)
 
 
 def test_names_of_markers():
@@ -266,17 +151,6 @@ def test_table_fits_the_other_functions(walk):
         ("Foot Off", "Right"), ("Foot Strike", "Right"), ("Foot Off", "Left")
     }  # fmt: skip
     DenseSynchronizer(50).fit(strides, keyframes=keyframes)
-
-
-def test_labels_of_recordings(walk):
-    tables = []
-    for k, x in enumerate(walk.data[:2]):
-        df = pd.DataFrame(x, columns=walk.skeleton.column_names)
-        df.attrs |= {"trial": f"walk {k}", "levels": ("trial", "frame"), "frame_rate": 100.0}
-        tables.append(df)
-    found = gait_events(tables)
-    assert found.columns.tolist() == ["trial", "label", "context", "frame", "time"]
-    assert found["trial"].unique().tolist() == ["walk 0", "walk 1"]
 
 
 def test_nothing_of_people_that_stand(ruler, real_data, capsys):

@@ -1,4 +1,4 @@
-"""gait_parameters: made walks have known lengths, times and asymmetries."""
+"""gait_parameters: made walks have known lengths and times."""
 
 import numpy as np
 import pandas as pd
@@ -28,16 +28,6 @@ def test_known_lengths_and_times(treadmill):
         assert own["stride time"] == pytest.approx(strides.mean(), rel=0.01)
         steps = np.diff(np.sort(np.concatenate(list(times.values()))))
         assert own["cadence"] == pytest.approx(60 / steps.mean(), rel=0.01)
-
-
-def test_asymmetry():
-    """The left foot strikes 5 % of the stride late: its step takes 55 %, the right one 45 %."""
-    walk = make_walk(4, n_strides=10, asymmetry=5, random_state=0)
-    table = gait_parameters(walk.data, walk.skeleton, frame_rate=walk.frame_rate)
-    found = table.xs("step time", level="parameter")["asymmetry"]
-    np.testing.assert_allclose(found, 20, atol=2)
-    even = table.xs("stride time", level="parameter")["asymmetry"]
-    np.testing.assert_allclose(even, 0, atol=2)
 
 
 def test_given_events_count():

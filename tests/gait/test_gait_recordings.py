@@ -204,16 +204,3 @@ def test_directions():
     apart = walk_of(points, landmarks=knee, frame_rate=100, feet=no_toes).forward
     apart = apart * np.sign(apart[:, :1])
     np.testing.assert_allclose(apart, np.tile([0.8, -0.6], (len(apart), 1)), atol=1e-9)
-
-
-def test_bodies_that_stand_have_a_direction_if_they_have_hips():
-    points = np.repeat(moving_points(np.zeros(1)), 30, axis=0)
-    points[:9, 1] = points[20:, 2] = np.nan
-    walk = walk_of(points)
-    np.testing.assert_allclose(walk.forward, np.tile([0.0, 1.0], (117, 1)), atol=1e-12)
-    assert walk_of(points[..., :2]).forward.tolist() == [[1.0]] * 117
-    points[:, 1:3] = points[:, :1]
-    assert (walk_of(points).forward == 0).all()
-    points[:, 0] = np.nan
-    with pytest.raises(ValueError, match="Walk: the pelvis is never seen above the feet"):
-        walk_of(points)
