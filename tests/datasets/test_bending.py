@@ -46,13 +46,6 @@ def test_limbs_keep_their_length():
             np.testing.assert_allclose(length, length[0])
 
 
-def test_equal_times_show_the_same_moment():
-    bunch = make_bending(2, style=0, noise=0, n_actors=1, random_state=0)
-    heights = [joint(bunch, i, "pelvis")[:, 1] for i in range(2)]
-    again = np.interp(bunch.times[0], bunch.times[1], heights[1])
-    assert np.abs(again - heights[0]).max() < 2e-3
-
-
 def test_warp_bounds_the_rates_and_n_actors_counts_the_actors():
     for times in make_bending(2, warp=0, random_state=0).times:
         np.testing.assert_allclose(times, np.linspace(0, 1, len(times)))

@@ -68,19 +68,7 @@ def test_curves_are_those_of_gait(gait):
         assert (force[1 : int(toe_off) - 2] > 0).all()
 
 
-def test_cycles_of_a_person_are_continuous():
-    gait = make_gait(2, 3, noise=0, random_state=0)
-    for i in (0, 1, 3, 4):
-        np.testing.assert_allclose(gait.data[i][-1], gait.data[i + 1][0], atol=1e-9)
-
-
 # -- differences between the groups -----------------------------------------------------
-
-
-def test_groups_are_equal_by_default():
-    gait = make_gait(4, random_state=0)
-    np.testing.assert_array_equal(*gait.group_curves)
-    np.testing.assert_array_equal(*gait.group_times)
 
 
 def test_timing_delays_toe_off_of_group_b():
@@ -163,18 +151,6 @@ def test_takes_are_continuous_walks_with_their_events(takes):
         assert np.abs(np.diff(x[:, :3], axis=0)).max() < 9
 
 
-def test_keyframes_of_takes_have_names_and_times(takes):
-    assert takes.keyframes.shape == (7, 25)
-    assert takes.keyframe_names[:2] + takes.keyframe_names[-1:] == [
-        "heel strike 1", "first force peak 1", "heel strike 5",
-    ]  # fmt: skip
-    for i, times in enumerate(takes.times):
-        at = np.interp(takes.keyframes[i], np.arange(len(times)), times)
-        np.testing.assert_allclose(at, takes.keyframe_times, atol=2e-3)
-        strikes = [e["frame"] for e in takes.events[i] if e["label"] == "Foot Strike"]
-        np.testing.assert_allclose(takes.keyframes[i][::6], strikes)
-
-
 def test_takes_and_cycles_show_the_same_people(gait, takes):
     for i in range(7):
         lasting = np.diff(takes.keyframes[i][::6])
@@ -234,16 +210,3 @@ def test_smallest_and_largest_parameters_give_finite_cycles(takes):
 def test_parameters_out_of_range_are_refused(params):
     with pytest.raises(ValueError, match=f"'{next(iter(params))}' parameter of make_gait"):
         make_gait(**params)
-
-
-def test_people_are_as_many_as_given():
-    """Ten by default, of two groups in turn; up to a million."""
-    ten = make_gait(random_state=0)
-    assert len(set(ten.person)) == 10
-    assert ten.person.tolist() == [f"person{i}" for i in range(10) for _ in range(3)]
-    for n in (1, 2, 5):
-        gait = make_gait(n, 2, random_state=0)
-        assert len(gait.data) == 2 * n
-        assert "".join(gait.group[::2]) == "ABABA"[:n]
-    with pytest.raises(ValueError, match=r"'n_people' parameter .* \[1, 1000000\]"):
-        make_gait(10**6 + 1)
