@@ -115,28 +115,9 @@ def set_word(rng, data):
     return data[:start] + b"".join(words) + data[start + 3000 :]
 
 
-def explode(rng, data):
-    """Very many joints, bones, words or frames."""
-    n = rng.choice((100, 3000, 20000))
-    if b":bonedata" in data:
-        bone = b"begin\nname b%d\ndirection 0 1 0\nlength 1\ndof rx\nend\n"
-        bones = b"".join(bone % i for i in range(n // 10))
-        chain = b"root b0\n" + b"".join(b"b%d b%d\n" % (i, i + 1) for i in range(n // 10 - 1))
-        bush = b"root " + b" ".join(b"b%d" % i for i in range(n // 10)) + b"\n"
-        data = data.replace(b":hierarchy", bones + b":hierarchy")
-        tree = rng.choice((bush, chain))
-        return re.sub(rb"(:hierarchy\s+begin\s*\n)", lambda match: match.group() + tree, data)
-    if b"HIERARCHY" in data:
-        joint = b"JOINT a { OFFSET 0 1 0 CHANNELS 0 "
-        tree = rng.choice((joint * n + b"} " * n, (joint + b"}\n") * n, joint * n, b"{" * n))
-        data = data.replace(b"JOINT", tree + b"JOINT", 1)
-    rows = rng.choice((b"", b"0\n", b"1\nroot 0 0 0 0 0 0\n", b" ", b"9" * 50))
-    return data + rows * n
-
-
 BINARY = (flip_bits, flip_bits, flip_bits, overwrite, truncate, repeat, repeat, move)
 BINARY += (set_value, set_value)
-TEXT = (flip_bits, flip_bits, overwrite, truncate, repeat, repeat, move, explode)
+TEXT = (flip_bits, flip_bits, overwrite, truncate, repeat, repeat, move)
 TEXT += (set_number, set_number, set_word, set_word)
 # How files are damaged, by the ending of their names.
 DAMAGES = {".c3d": BINARY, ".npz": BINARY[:8] + ARCHIVE}

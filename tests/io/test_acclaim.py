@@ -62,15 +62,6 @@ def test_lines_that_are_left_out_have_defaults(tmp_path):
         pd.testing.assert_frame_equal(acclaim(tmp_path, asf.replace(f"{line}\n", "")), expected)
 
 
-def test_hierarchy_may_have_any_order(tmp_path):
-    expected = acclaim(tmp_path)
-    asf = ASF.replace("root thigh\n    thigh shin", "thigh shin\n    root thigh")
-    assert asf != ASF
-    df = acclaim(tmp_path, asf)
-    assert df.attrs["joints"] == ["root", "shin", "thigh"]
-    pd.testing.assert_frame_equal(df[expected.columns], expected)
-
-
 def test_angles_may_be_radians(tmp_path):
     expected = acclaim(tmp_path)
     asf = ASF.replace("angle deg", "angle Radians").replace("0 0 90", f"0 0 {np.pi / 2}")

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync.io import fill_gaps, read_motion
+from sklearn_motionsync.io import read_motion
 
 from motion_files import c3d, put, texts, tracks
 
@@ -29,22 +29,6 @@ def test_files_of_every_processor_are_the_same(tmp_path, machine, real):
     assert (df.attrs["joints"], df.attrs["frame_rate"]) == (["M0", "M1", "M2"], 50)
     assert (df.attrs["first_frame"], df.attrs["events"], df.attrs["left_out"]) == (1, [], "")
     assert df.attrs["groups"] == {"markers": {"n": 3, "units": "mm", "frame_rate": 50.0}}
-
-
-def test_gaps_are_nan_with_a_warning_or_filled(tmp_path):
-    path = put(tmp_path, c3d(tracks(gap=(10, 14))), "a.c3d")
-    message = (
-        r"^a\.c3d: 3\.3 % of the positions are missing \(NaN\), of 1 of 3 markers \(M1\): 1 gap, "
-        r"the longest of 4 frames\. Interpolate short gaps with read_motion\(\.\.\., max_gap="
-    )
-    with pytest.warns(UserWarning, match=message) as caught:
-        df = read_motion(path)
-    assert len(caught) == 1
-    assert caught[0].filename == __file__
-    np.testing.assert_array_equal(df.to_numpy().reshape(40, 3, 3), tracks(gap=(10, 14)))
-    filled = read_motion(path, max_gap=4)
-    pd.testing.assert_frame_equal(filled, fill_gaps(df, 4))
-    assert filled.attrs == df.attrs
 
 
 def test_missing_parameters_have_defaults(tmp_path):
@@ -104,33 +88,10 @@ def test_of_two_scales_that_of_the_header_is_used_with_a_warning(tmp_path):
     np.testing.assert_array_equal(df.to_numpy().reshape(40, 3, 3), tracks())
 
 
-def test_floats_are_not_scaled(tmp_path):
-    positions = tracks()
-    other = {"SCALE": (4, [], struct.pack("<f", -0.1))}
-    df = read_motion(put(tmp_path, c3d(positions, changes=other), "a.c3d"))
-    np.testing.assert_allclose(df, positions.reshape(len(df), -1), rtol=1e-6)
-
-
 def test_scales_of_header_and_parameters_may_differ_by_rounding(tmp_path):
     other = {"SCALE": (4, [], struct.pack("<f", 0.50004))}
     df = read_motion(put(tmp_path, c3d(tracks(), real=False, changes=other), "a.c3d"))
     np.testing.assert_allclose(df, tracks().reshape(40, 9), rtol=1e-4)
-
-
-def many_texts(n):
-    return {"NOTES": {f"N{i}": texts("x" * 255, "y" * 255) for i in range(n)}}
-
-
-def test_parameters_end_at_the_data_whatever_their_stated_length(tmp_path):
-    for n_blocks in (1, 2, 255):
-        content = c3d(tracks(), others=many_texts(5), n_blocks=n_blocks)
-        path = put(tmp_path, content, "a.c3d")
-        np.testing.assert_array_equal(read_motion(path).to_numpy().reshape(40, 3, 3), tracks())
-    path = put(tmp_path, c3d(tracks(), others=many_texts(300), n_blocks=45), "a.c3d")
-    assert len(read_motion(path)) == 40
-    end = content.index(b"N4") - 2
-    junk = content[:end] + b"\0\0" + b"\xff" * 100 + content[end + 102 :]
-    assert len(read_motion(put(tmp_path, junk, "a.c3d"))) == 40
 
 
 def test_bytes_too_few_for_a_parameter_are_none(tmp_path):
@@ -473,15 +434,6 @@ def test_analog_channels_may_be_unsigned(tmp_path):
     np.testing.assert_array_equal(df["Fx"], (raw.ravel() - 40000) * 0.5)
 
 
-def test_files_may_have_analog_channels_only(tmp_path):
-    path = put(tmp_path, c3d(np.zeros((40, 0, 3)), analog=np.ones((40, 2, 2))), "a.c3d")
-    df = read_motion(path, group="analog")
-    assert df.shape == (80, 2)
-    assert df.attrs["channels"] == ["channel_1", "channel_2"]
-    with pytest.raises(ValueError, match=r"no markers in this file; .* 'analog' \(2\)\."):
-        read_motion(path)
-
-
 @pytest.mark.parametrize("real", [True, False])
 @pytest.mark.parametrize(("header", "used"), [(3, 3), (9, 3), (12, 9), (12, 2.5), (12, -3)])
 def test_of_two_numbers_of_analog_values_the_size_tells_the_right_one(tmp_path, real, header, used):
@@ -573,13 +525,6 @@ def test_the_header_has_up_to_18_events(tmp_path, n, width):
     events = events.attrs["events"]
     assert [event["label"] for event in events] == (labels if n < 19 else [])
     assert {event["frame"] for event in events} <= {1.0}
-
-
-def test_events_of_the_header_without_a_rate_have_their_own_times(tmp_path):
-    header = {"first": 101, "last": 140, "events": [("RHS", 0.5)]}
-    content = c3d(tracks(), header=header, changes={"RATE": floats(0)})
-    events = read_motion(put(tmp_path, content, "a.c3d")).attrs["events"]
-    assert events == [{"label": "RHS", "context": None, "time": 0.5, "frame": None}]
 
 
 def test_first_frame_may_take_one_word_or_two_or_be_0(tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import LinearSynchronizer, to_frame
+from sklearn_motionsync import to_frame
 from sklearn_motionsync.io import cut_at_events, read_motion
 
 from motion_files import c3d, everything, put, texts
@@ -115,14 +115,6 @@ def test_labels_follow_those_of_the_recording():
 def test_event_marked_twice_in_a_frame_counts_once():
     events = ("a", None, 9.0), ("a", None, 9.3), ("a", None, 30.0), ("a", None, 29.8)
     assert rows(cut_at_events(recording(*events), "a")) == [[9, 30]]
-
-
-def test_events_within_trials_are_keyframes():
-    parts = cut_at_events(recording(*WALK), STRIKE)
-    with_off = [x for x in parts if any(e["label"] == OFF for e in x.attrs["events"])]
-    keyframes = [[e["frame"] for e in x.attrs["events"]] for x in with_off]
-    sync = LinearSynchronizer(n_frames=30).fit(with_off, keyframes=keyframes)
-    assert sync.transform(with_off, keyframes=keyframes).shape == (2, 30, 1)
 
 
 @pytest.mark.parametrize(

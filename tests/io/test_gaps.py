@@ -73,23 +73,6 @@ def test_keypoints_in_the_plane_are_filled():
     np.testing.assert_array_equal(fill_gaps(plane, 9)[["a_x", "a_y"]], in_space[["a_x", "a_y"]])
 
 
-def test_joints_of_the_same_name_are_filled_separately():
-    df = with_gaps()
-    twice = pd.concat([df, df * 2], axis=1)
-    expected = pd.concat([fill_gaps(df, 9), fill_gaps(df * 2, 9)], axis=1)
-    pd.testing.assert_frame_equal(fill_gaps(twice, 9), expected)
-    assert find_gaps(twice)["joint"].tolist() == ["a", "a", "c", "c"] * 2
-
-
-def test_missing_values_of_other_dtypes_are_gaps():
-    df = with_gaps()
-    for other in (df.convert_dtypes(), df.astype(object).where(df.notna(), None)):
-        pd.testing.assert_frame_equal(find_gaps(other), find_gaps(df))
-        pd.testing.assert_frame_equal(fill_gaps(other, 9), fill_gaps(df, 9))
-    single = df.astype("f4")
-    pd.testing.assert_frame_equal(fill_gaps(single, 9), fill_gaps(single.astype("f8"), 9))
-
-
 def one_changed(value):
     df = with_gaps().astype(object)
     df.iloc[7, 4] = value
@@ -115,13 +98,6 @@ def test_other_input_is_refused(df, message):
         find_gaps(df)
     with pytest.raises(ValueError, match=message):
         fill_gaps(df, 3)
-
-
-def test_tables_are_filled_trial_by_trial():
-    table = pd.concat({"p": with_gaps(), "q": with_gaps() * 2})
-    filled = table.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=9)
-    np.testing.assert_array_equal(filled.loc["q"], fill_gaps(with_gaps() * 2, 9))
-    pd.testing.assert_frame_equal(fill_gaps(table.loc[["p"]], 9), filled.loc[["p"]])
 
 
 @pytest.mark.parametrize(

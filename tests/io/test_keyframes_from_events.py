@@ -208,18 +208,6 @@ def test_events_of_cut_cycles():
     np.testing.assert_allclose(met, own, atol=1e-3)
 
 
-def test_a_table_of_the_same_events_says_the_same():
-    _, _, cycles = gait_cycles()
-    rows = [
-        dict(zip(("recording", "part"), x.attrs["trial"], strict=True)) | event
-        for x in cycles
-        for event in x.attrs["events"]
-    ]
-    events = pd.DataFrame(rows).drop(columns="time")
-    found = keyframes_from_events(cycles, events)
-    pd.testing.assert_frame_equal(found, keyframes_from_events(cycles))
-
-
 def test_rows_that_events_do_not_count_are_refused():
     _, _, cycles = gait_cycles()
     with pytest.raises(ValueError, match="Trial 0: by its index row 0 is frame 5 of the rec"):

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import to_frame
 from sklearn_motionsync.io import fill_gaps, read_motion
 from sklearn_motionsync.io.motion import ENDINGS, FORMATS
 
@@ -169,15 +168,6 @@ def test_missing_skeleton_is_an_error(tmp_path):
 
 
 # -- recordings -------------------------------------------------------------------------
-
-
-def test_recordings_have_the_names_of_their_files_in_tables(tmp_path):
-    recordings = [read_motion(put(tmp_path, body(), f"walk {k}.bvh")) for k in "ba"]
-    table = to_frame(recordings)
-    assert table.index.names == ["recording", "frame"]
-    assert list(table.index.unique("recording")) == ["walk b", "walk a"]
-    # The same name twice would join two recordings.
-    assert list(to_frame(recordings[:1] * 2).index.unique(0)) == [0, 1]
 
 
 @pytest.mark.parametrize(

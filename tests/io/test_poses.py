@@ -77,14 +77,6 @@ def test_variants_of_datasets_are_the_same(change):
         assert df.attrs == expected.attrs
 
 
-@pytest.mark.parametrize("dtype", ["f4", "i8", "u1", "?"])
-def test_positions_of_any_numbers_are_float64(dtype):
-    positions = (9 * np.abs(POSITIONS)).astype(dtype)
-    for i, df in enumerate(from_poses(poses(positions))):
-        assert set(df.dtypes) == {np.dtype(np.float64)}
-        np.testing.assert_array_equal(df, positions[..., i].swapaxes(1, 2).reshape(40, 6))
-
-
 @pytest.mark.parametrize("start", [pd.Timestamp("2024-01-01"), pd.Timedelta(7, "s")])
 def test_dates_and_durations_count_from_the_first_frame(start):
     for df in from_poses(poses(times=start + pd.to_timedelta(np.arange(40) / 50, "s"))):

@@ -51,26 +51,6 @@ def check_attrs(part, whole, step=1):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_recording_without_its_beginning_or_end_is_cut_at_the_same_frames(seed):
-    rng = np.random.default_rng(seed)
-    df = recording(rng)
-    k = int(rng.integers(0, len(df) // 2))
-    for rows in (slice(k, None), slice(None, len(df) - k)):
-        some = df.iloc[rows]
-        inside = [
-            part
-            for part in cut_at_events(df, "Strike")
-            if part["number"].isin(some["number"]).all()
-        ]
-        found = cut_at_events(some, "Strike")
-        for x, y in zip(found, inside, strict=True):
-            pd.testing.assert_frame_equal(x, y)
-            drop = "trial"
-            assert {**x.attrs, drop: 0} == {**y.attrs, drop: 0}
-            check_attrs(x, df)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
 def test_every_kth_frame_is_cut_next_to_the_events(seed):
     rng = np.random.default_rng(seed)
     df = recording(rng)
@@ -148,11 +128,6 @@ def test_an_index_that_does_not_tell_frames_is_refused(index):
     assert part.attrs["rows"] == [9, 30]
     (x,) = to_trials(df.assign(trial=0), by="trial")
     assert "events" not in x.attrs
-
-
-def test_an_empty_recording_has_no_trials():
-    df = recording(np.random.default_rng(0))
-    assert cut_at_events(df.iloc[:0], "Strike") == []
 
 
 @pytest.mark.parametrize("seed", range(4))

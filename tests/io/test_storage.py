@@ -81,11 +81,6 @@ def test_vectors_become_columns(tmp_path, kind, ends, form):
     assert list(df.columns) == [f"{name}_imu_{end}" for name in "ab" for end in ends]
 
 
-def test_repeated_labels_are_numbered(tmp_path):
-    df = read(tmp_path, storage(VALUES, ["a", "a", "b"]))
-    assert df.attrs["channels"] == list(df.columns) == ["a", "a_2", "b"]
-
-
 @pytest.mark.parametrize("nothing", ["nan", "-NaN", "1.#QNAN", "-nan(ind)", "inf", "-Infinity", ""])
 def test_missing_values_are_nan_with_a_warning(tmp_path, nothing):
     text = TEXT.replace(f"\t{VALUES[7, 1]}\t", f"\t{nothing}\t")

@@ -87,16 +87,6 @@ def test_unseen_markers_are_nan_with_a_warning(tmp_path, blank, end):
     assert not read_motion(path, max_gap=6).isna().any(axis=None)
 
 
-def test_marker_with_a_missing_coordinate_is_nan(tmp_path):
-    positions, lines = tracks(), TEXT.split("\n")
-    fields = lines[9].split("\t")
-    lines[9] = "\t".join([*fields[:3], "", *fields[4:]])
-    positions[3, 0] = np.nan
-    with pytest.warns(UserWarning, match="positions are missing"):
-        df = read(tmp_path, "\n".join(lines))
-    np.testing.assert_array_equal(df, positions.reshape(40, 9))
-
-
 def test_rows_may_end_behind_a_marker_but_the_last(tmp_path):
     positions = tracks()
     positions[:20, 2] = np.nan
@@ -151,17 +141,6 @@ def test_contradiction_of_rate_and_times_is_a_warning(tmp_path):
         df = read(tmp_path, text)
     assert df.attrs["frame_rate"] == 50
     assert read(tmp_path, text, frame_rate=50).attrs["frame_rate"] == 50
-
-
-def test_lost_frames_are_uneven_times(tmp_path):
-    times = np.delete(np.arange(41) / 50, 17)
-    text = trc(tracks(), NAMES, times=times)
-    with pytest.warns(UserWarning, match=r"steps of 0.02 to 0.04 s, .*to_trials\(df\.assign"):
-        df = read(tmp_path, text)
-    assert df.attrs["frame_rate"] is None
-    np.testing.assert_allclose(df.attrs["times"], times)
-    for rate in (50, 0.5):
-        assert read(tmp_path, text, frame_rate=rate).attrs["frame_rate"] == rate
 
 
 @pytest.mark.parametrize(
