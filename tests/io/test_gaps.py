@@ -73,6 +73,15 @@ def test_keypoints_in_the_plane_are_filled():
     np.testing.assert_array_equal(fill_gaps(plane, 9)[["a_x", "a_y"]], in_space[["a_x", "a_y"]])
 
 
+def test_missing_values_of_other_dtypes_are_gaps():
+    df = with_gaps()
+    for other in (df.convert_dtypes(), df.astype(object).where(df.notna(), None)):
+        pd.testing.assert_frame_equal(find_gaps(other), find_gaps(df))
+        pd.testing.assert_frame_equal(fill_gaps(other, 9), fill_gaps(df, 9))
+    single = df.astype("f4")
+    pd.testing.assert_frame_equal(fill_gaps(single, 9), fill_gaps(single.astype("f8"), 9))
+
+
 def one_changed(value):
     df = with_gaps().astype(object)
     df.iloc[7, 4] = value

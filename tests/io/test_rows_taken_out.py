@@ -130,6 +130,11 @@ def test_an_index_that_does_not_tell_frames_is_refused(index):
     assert "events" not in x.attrs
 
 
+def test_an_empty_recording_has_no_trials():
+    df = recording(np.random.default_rng(0))
+    assert cut_at_events(df.iloc[:0], "Strike") == []
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_gaps_are_filled_where_frames_are_in_time(seed):
     rng = np.random.default_rng(seed)

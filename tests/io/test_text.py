@@ -74,6 +74,13 @@ def test_numbers_are_finite_and_below_a_limit(tmp_path, word, good):
         text.numbers([word], 2, "it")
 
 
+def test_many_numbers_below_the_limit_are_read(tmp_path):
+    words = [b"9e11"] * 4
+    assert list(opened(tmp_path, "").numbers(words, 4, "it")) == [9e11] * 4
+    text = opened(tmp_path, "9e11 9e11\n-9e11 9e11\n")
+    assert text.table(2, "a frame").tolist() == [[9e11, 9e11], [-9e11, 9e11]]
+
+
 @pytest.mark.parametrize(
     ("word", "number"),
     [("1", 1), ("1.1e-12", 1.1e-12), ("9e11", 9e11), ("1e-12", 0), ("0", 0), ("-1", 0)],
@@ -154,6 +161,11 @@ def test_tables_of_several_portions_are_one(tmp_path, monkeypatch, end):
     text = opened(tmp_path, "\n".join(lines) + end)
     np.testing.assert_array_equal(text.table(5, "a frame"), values)
     assert text.line_number == len(lines)
+
+
+def test_an_empty_table_has_its_columns(tmp_path):
+    for content in ("", " \n\n", "\n"):
+        assert opened(tmp_path, content).table(3, "a frame").shape == (0, 3)
 
 
 @pytest.mark.parametrize(
