@@ -13,8 +13,7 @@ INDEX = (ROOT / "examples" / "index.rst").read_text(encoding="utf-8")
 # At 388 pixels, the width of a page on a phone, letters of 10 points are still 8 pixels high.
 LARGEST_WIDTH = 6.5
 # These take a second or two each.
-QUICK = ["plot_blend", "plot_csv", "plot_find", "plot_helps_little", "plot_model"]
-QUICK += ["plot_one_dimension", "plot_trellis"]
+QUICK = ["plot_find", "plot_helps_little", "plot_one_dimension", "plot_trellis"]
 
 
 def test_the_index_names_each_page_once_and_lists_it():
