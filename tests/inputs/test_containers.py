@@ -1,4 +1,4 @@
-"""Trials as other packages keep them: nested tables, labelled arrays, tables of two levels.
+"""Trials as other packages keep them: nested tables and labelled arrays.
 
 The objects are made by hand, as sktime, aeon, xarray and polars make them.
 """
@@ -8,17 +8,10 @@ import pandas as pd
 import polars as pl
 import pytest
 import xarray as xr
-from sklearn.compose import make_column_transformer
-from sklearn.linear_model import LogisticRegression
-from sklearn.model_selection import cross_val_score
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
-    ActionClassifier,
     DenseSynchronizer,
     LinearSynchronizer,
     Match,
-    TimingChannel,
     to_frame,
     to_trials,
 )
@@ -68,15 +61,6 @@ def test_a_nested_table_is_a_trial_a_row(trials, cell):
     same_bits([aligned.to_numpy().reshape(12, 30, 3)], [sync().fit(trials).transform(trials)])
 
 
-def test_a_nested_table_and_back(trials):
-    table = nested(trials, pd.RangeIndex(12))
-    rows = [{n: x[n].set_axis(pd.RangeIndex(len(x))) for n in x} for x in to_trials(table)]
-    back = pd.DataFrame(rows)
-    for name in NAMES:
-        for a, b in zip(back[name], table[name], strict=True):
-            pd.testing.assert_series_equal(a, b, check_names=False, check_index_type="exact")
-
-
 def test_cells_keep_times_types_and_labels_of_several_levels(trials):
     clock = pd.date_range("2026-01-01", periods=24, freq="10ms", name="clock")
     single = [x[:24].astype(np.float32) for x in trials[:2]]
@@ -92,30 +76,6 @@ def test_cells_keep_times_types_and_labels_of_several_levels(trials):
     assert seconds.max() == pytest.approx(0.23)
 
 
-def test_scikit_learn_splits_a_nested_table_by_trial(trials):
-    y = np.arange(12) % 2
-    classifier = ActionClassifier(n_frames=10)
-    scores = [cross_val_score(classifier, X, y, cv=3) for X in (nested(trials), trials)]
-    np.testing.assert_array_equal(*scores)
-
-
-def test_a_column_transformer_takes_curves_beside_numbers(trials):
-    table = nested(trials).assign(age=np.arange(20.0, 32))
-    flat = FunctionTransformer(lambda x: x.reshape(len(x), -1))
-    curves = make_pipeline(LinearSynchronizer(8), flat)
-    columns = make_column_transformer((curves, NAMES), ("passthrough", ["age"]))
-    found = columns.fit_transform(table)
-    expected = LinearSynchronizer(8).fit_transform(trials).reshape(12, -1)
-    np.testing.assert_array_equal(found, np.column_stack([expected, table["age"]]))
-    make_pipeline(columns, LogisticRegression(max_iter=5000)).fit(table, np.arange(12) % 2)
-
-
-def test_a_sample_of_a_nested_table(trials):
-    sync = DenseSynchronizer(n_frames=20, max_fit=5, random_state=0)
-    tables = sync.fit(nested(trials)).pattern_, sync.fit(trials).pattern_
-    np.testing.assert_array_equal(*tables)
-
-
 def test_lists_in_a_table_of_polars(trials):
     rows = pl.DataFrame({"trial": np.repeat(np.arange(12), [len(x) for x in trials])})
     rows = rows.with_columns(
@@ -124,18 +84,6 @@ def test_lists_in_a_table_of_polars(trials):
     table = rows.group_by("trial", maintain_order=True).agg(pl.all()).drop("trial")
     same_bits(to_trials(table), trials)
     same_bits([sync().fit(table).transform(table)], [sync().fit(trials).transform(trials)])
-
-
-# -- tables of two levels, as sktime makes them -------------------------------------------------
-
-
-@pytest.mark.parametrize("names", [[None, None], ["instances", "timepoints"]])
-def test_a_table_of_two_levels_and_back(trials, names):
-    index = pd.concat([pd.DataFrame(x) for x in trials], keys=range(12)).index.set_names(names)
-    table = pd.DataFrame(np.concatenate(trials), index=index, columns=NAMES)
-    same_bits(to_trials(table), trials)
-    back = to_frame(to_trials(table))
-    pd.testing.assert_frame_equal(back, table.rename_axis(back.index.names), check_exact=True)
 
 
 # -- arrays with channels before frames, as aeon and sktime have them -----------------------------
@@ -264,10 +212,3 @@ def test_rows_of_a_labelled_array_of_two_dimensions_are_univariate(trials):
     array = labelled(trials).sel(angle="knee", drop=True)
     expected = LinearSynchronizer().fit_transform(array.values)
     np.testing.assert_array_equal(LinearSynchronizer().fit_transform(array), expected)
-
-
-def test_timing_of_a_labelled_array(trials):
-    """What fits another estimator passes the array on."""
-    array = labelled(trials)
-    channel = TimingChannel(LinearSynchronizer()).set_output(transform="pandas")
-    assert list(channel.fit_transform(array).columns) == [*NAMES, "offset"]

@@ -6,11 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
-from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
-    ActionModel,
     ASpace,
-    DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
     Skeleton,
@@ -184,15 +181,6 @@ def test_a_refit_forgets_what_was_known():
         fitted.transform([x.set_axis(x.columns, axis=1) for x in tables(ASpace(), RATES[0][0])])
 
 
-def test_messages_keep_the_names_of_trials():
-    X = tables(ASpace(), {"units": "m"}, {"units": "mm"})
-    for df, name in zip(X, ["Pat", "Pia", "Paul", "Pip", "Per", "Pop"], strict=True):
-        df.attrs["trial"] = name
-    message = r"^Trial 5 \('Pop'\) has the unit 'mm', and trial 0 \('Pat'\) has the unit"
-    with pytest.raises(ValueError, match=message):
-        to_frame(X)
-
-
 def test_more_than_one_difference_is_counted():
     with pytest.warns(UserWarning, match=r"Trial 4 has 60 .* 30 frames a second\. 1 more"):
         LinearSynchronizer().fit(tables(ASpace(), RATE, {"frame_rate": 60}, {"frame_rate": 60}))
@@ -206,18 +194,6 @@ def test_bodies_hold_the_axis_of_their_skeleton_against_that_of_tables():
         DirectionCosines(Skeleton.paper()).fit([df])
     df.attrs["up"] = "y"
     DirectionCosines(Skeleton.paper()).fit([df])
-
-
-def test_pipelines_see_rates_at_their_first_step():
-    bunch = make_bending(4, n_frames=40, random_state=0)
-    X = [pd.DataFrame(x, columns=bunch.skeleton.column_names) for x in bunch.data]
-    for df in X:
-        df.attrs["frame_rate"] = 50
-    steps = DirectionCosines(bunch.skeleton), ASpace(2), DenseSynchronizer(20), ActionModel()
-    pipe = make_pipeline(*steps).fit(X)
-    X[3].attrs["frame_rate"] = 200
-    with pytest.warns(UserWarning, match="Trial 3 has 200 frames a second"):
-        pipe.predict(X)
 
 
 def test_blends_have_the_facts_that_trials_share():

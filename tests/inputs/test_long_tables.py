@@ -10,8 +10,6 @@ import pandas as pd
 import polars as pl
 import pytest
 from IPython.core.formatters import HTMLFormatter
-from sklearn.base import BaseEstimator, TransformerMixin
-from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionDetector,
@@ -22,7 +20,6 @@ from sklearn_motionsync import (
     to_frame,
     to_trials,
 )
-from sklearn_motionsync.metrics import least_squares
 from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.takes import CycleSegmenter
 
@@ -74,12 +71,6 @@ def test_the_time_puts_frames_in_order_and_keys_name_trials(table, levels):
         assert not x.attrs["resampled"]
 
 
-def test_labels_are_plain(walks):
-    assert repr(walks[0].attrs["trial"][1]) in ("1", "2")
-    (numbered,) = to_trials(pd.DataFrame({"k": [3, 3], "x": [0.0, 1]}), by="k")
-    assert repr(numbered.attrs["trial"]) == "3"
-
-
 def test_the_way_back(table, walks):
     expected = table.set_index([*KEYS, "time"]).sort_index()
     back = to_frame(walks)
@@ -123,41 +114,6 @@ def test_any_number_of_levels_named_or_not(names):
     assert labels_of(out) == [("a", 1, "x"), ("a", 1, "y"), ("b", 1, "x"), ("b", 1, "y")]
     unnamed = ["level_0", "level_1", "level_2", "frame"]
     assert out.index.names == (unnamed if names[0] is None else [*names[:3], "frame"])
-
-
-class LabelRecorder(TransformerMixin, BaseEstimator):
-    """Records the labels of its input."""
-
-    seen = []
-
-    def fit(self, X, y=None):
-        return self
-
-    def transform(self, X):
-        LabelRecorder.seen.append(
-            labels_of(ASpace(1).set_output(transform="pandas").fit_transform(X))
-        )
-        return X
-
-
-def test_lists_keep_labels_through_cross_validation(walks):
-    labels = [x.attrs["trial"] for x in walks]
-    pipe = make_pipeline(LabelRecorder(), LinearSynchronizer(10))
-
-    def score(estimator, X, y=None):
-        estimator.transform(X)
-        return 0.0
-
-    for search in (
-        lambda: cross_val_score(pipe, walks, cv=3, scoring=score),
-        lambda: GridSearchCV(
-            pipe, {"linearsynchronizer__n_frames": [5, 9]}, scoring=score, cv=3
-        ).fit(walks),
-    ):
-        LabelRecorder.seen = []
-        search()
-        assert [labels[0], labels[1]] in LabelRecorder.seen
-        assert labels[2:] in LabelRecorder.seen
 
 
 def test_copies_of_a_trial_are_numbered(walks):
@@ -204,14 +160,6 @@ def test_departures_carry_the_label(walks):
     assert report.index.tolist() == [x.attrs["trial"] for x in walks]
 
 
-def test_measures_take_tables_of_several_levels(walks):
-    linear = LinearSynchronizer(20).set_output(transform="pandas").fit(walks)
-    dense = DenseSynchronizer(20).set_output(transform="pandas").fit(walks)
-    tables = linear.transform(walks), dense.transform(walks)
-    arrays = [np.stack(to_trials(df)) for df in tables]
-    assert least_squares(*tables) == least_squares(*arrays)
-
-
 # -- times ----------------------------------------------------------------------------------
 
 
@@ -227,15 +175,6 @@ def test_uneven_times_are_resampled_on_straight_lines():
     for name, curve in walk(time, 1).items():
         np.testing.assert_allclose(x[name], np.interp(x.index, time, curve), rtol=1e-12)
         np.testing.assert_allclose(x[name], walk(x.index.to_numpy(), 1)[name], atol=2e-3)
-
-
-@pytest.mark.parametrize("jitter", [0.02, 0.2, 0.45])
-def test_jitter_is_resampled_too(jitter):
-    time = np.arange(9.0)
-    time[4] += jitter
-    (x,) = to_trials(pd.DataFrame({"t": time, "x": 3 * time}), time="t")
-    np.testing.assert_allclose(x.index, np.linspace(0, 8, len(x)))
-    np.testing.assert_allclose(x["x"], 3 * x.index)
 
 
 @pytest.mark.parametrize(("rate", "unit"), [(60, 1), (90, 1), (120, 1000)])
@@ -352,11 +291,6 @@ def test_a_time_among_the_levels_goes_with_the_others(table, walks):
             pd.testing.assert_frame_equal(x[["knee"]], y)
     one = table[table["subject"] == "ann"].set_index("trial").drop(columns="subject")
     assert [x.attrs["trial"] for x in to_trials(one, time="time")] == [1, 2]
-
-
-def test_attributes_of_the_table_stay(table):
-    table.attrs["frame_rate"] = 50
-    assert all(x.attrs["frame_rate"] == 50 for x in to_trials(table, by=KEYS, time="time"))
 
 
 def test_levels_of_a_wide_file_are_keys(tmp_path):
@@ -631,29 +565,6 @@ def frame():
         [("b", 0), ("b", 1), ("a", 3), ("a", 5), ("a", 9)], names=["trial", "t"]
     )
     return pd.DataFrame({"x": [1.0, 2, 3, 4, 5], "y": [5.0, 4, 3, 2, 1]}, index=index)
-
-
-@pytest.mark.parametrize("order", [[0, 1, 2, 3, 4], [0, 2, 1, 3, 4]])
-def test_index_splits_in_order_of_appearance_and_back(frame, order):
-    first, second = to_trials(frame.iloc[order])
-    assert first["x"].tolist() == [1, 2]
-    assert second.index.tolist() == [3, 5, 9]
-    back = to_frame([first, second], trials=["b", "a"])
-    pd.testing.assert_frame_equal(back, frame.rename_axis(["trial", "t"]))
-
-
-def test_arrays_with_gaps_survive_the_round_trip():
-    X = [np.array([[1.0, 2], [np.nan, 4], [5, 6]]), np.ones((2, 2))]
-    df = to_frame(X)
-    assert df.index.names == ["trial", "frame"]
-    for a, b in zip(to_trials(df), X, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
-def test_rows_without_a_time_keep_their_order(table):
-    found = to_trials(table.drop(columns=["time", "trial"]), by="subject")
-    sizes = table.groupby("subject", sort=False).size()
-    assert [x.index.tolist() for x in found] == [list(range(n)) for n in sizes]
 
 
 @pytest.mark.parametrize("labels", [["a"], ["a", "a"], ["a", "b", "c"]])

@@ -8,9 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
-from sklearn.model_selection import KFold, cross_val_score
-from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionModel, LinearSynchronizer, to_frame, to_trials
+from sklearn_motionsync import LinearSynchronizer, to_frame
 from sklearn_motionsync.inputs.recorded import (
     Recorded,
     frame_rate_of_rows,
@@ -19,8 +17,6 @@ from sklearn_motionsync.inputs.recorded import (
     refuse_seconds,
     timeless,
 )
-from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
-from sklearn_motionsync.takes import find_trials
 
 from estimators import EVERY, by_name, data_for
 
@@ -230,23 +226,6 @@ def test_rows_split_by_cross_validation_are_warned_of(estimator, rate):
 
 
 @pytest.mark.parametrize(
-    "splits", [KFold(3, shuffle=True, random_state=0), KFold(10, shuffle=True, random_state=0)]
-)
-def test_cross_validation_of_a_table_is_warned_of(splits):
-    t = np.arange(90) / 30
-    table = to_frame([np.column_stack([np.sin(t + k), np.cos(2 * t + k)]) for k in range(6)])
-    pipe = make_pipeline(LinearSynchronizer(20), ActionModel())
-    with pytest.warns(UserWarning, match=SPLIT) as caught:
-        cross_val_score(pipe, table, cv=splits)
-    # In fit and in score.
-    assert sum("rows look split" in str(each.message) for each in caught) >= 2 * splits.n_splits - 2
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        cross_val_score(pipe, to_trials(table), cv=3)
-        pipe.fit(table.iloc[::2]).score(table.iloc[1::3])
-
-
-@pytest.mark.parametrize(
     "frames",
     [
         [*range(20), *range(23, 60)],
@@ -263,39 +242,6 @@ def test_whole_numbers_of_unknown_rate_with_few_gaps_pass(frames):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         to_frame([df])
-
-
-def test_a_take_backwards_is_warned_of_where_it_is_searched():
-    t = np.arange(200) / 30
-    take = pd.DataFrame({"knee": np.sin(t), "hip": np.cos(1.7 * t)})
-    with pytest.warns(UserWarning, match="Trial 0: its rows are not in order of time"):
-        find_trials(take.iloc[50:90], take.iloc[::-1])
-
-
-def test_rows_of_tracks_are_even_steps_unless_their_times_are_given():
-    t = np.arange(30) / 30
-    X = [pd.DataFrame({"knee": np.sin(t + k), "hip": np.cos(2 * t + k)}) for k in (0, 0.1, 0.2)]
-    for df in X:
-        df.index, df.attrs = pd.Index(t, name="time"), {"frame_rate": 30}
-    some = [df.drop(df.index[10:15]) for df in X]
-    linear = LinearSynchronizer()
-    for live in (
-        OnlineSynchronizer(linear, frame_rate=30),
-        MotionTracker(linear, 10, frame_rate=30),
-    ):
-        tracks = [live.fit(X).track]
-        tracks += [live.smooth] if hasattr(live, "smooth") else []
-        for track in tracks:
-            track(some, times=[df.index for df in some])
-            with pytest.warns(UserWarning, match="Trial 0: .* not even"):
-                track(some)
-            with pytest.warns(UserWarning, match="Trial 0: .* order of time"):
-                track([df.iloc[::-1] for df in X])
-
-
-def test_the_order_of_rows_may_be_meant():
-    df = pd.DataFrame({"knee": np.arange(60.0)}).iloc[::-1].reset_index(drop=True)
-    assert to_frame([df])["knee"].iloc[0] == 59
 
 
 # -- the attrs of some rows ---------------------------------------------------------------------
