@@ -19,7 +19,6 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import (
-    ActionModelDisplay,
     MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
@@ -97,23 +96,6 @@ def draw_synchronization(**arguments):
 )  # fmt: skip
 def test_synchronization_from_predictions_refuses(arguments, message):
     refuses(lambda: draw_synchronization(**arguments), message)
-
-
-def test_names_and_units_are_on_the_axes(pipe):
-    given = {"features": [0, 1], "units": ["m", "s"], "xlabel": "% gait cycle"}
-    points = pipe[:2].transform(POSITIONS)
-    match = pipe[2].match(points)
-    for drawn, panels in (
-        (SynchronizationDisplay.from_estimator(pipe, POSITIONS, ylabel="a", **given), (0, 2)),
-        (SynchronizationDisplay.from_predictions(points, match, ylabel="a", **given), (0, 2)),
-        (ActionModelDisplay.from_estimator(pipe, POSITIONS, ylabel="a", **given), (0, 1)),
-    ):
-        assert [drawn.axes_[k].get_ylabel() for k in panels] == ["a (m)", "a (s)"]
-        assert drawn.axes_[-1].get_xlabel() == "% gait cycle"
-    message = "units: there is no signal 'knee'; there are aspace0"
-    refuses(
-        lambda: ActionModelDisplay.from_estimator(pipe, features=0, units={"knee": "m"}), message
-    )
 
 
 def test_nan_is_drawn_as_a_gap():

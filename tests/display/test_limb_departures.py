@@ -2,10 +2,8 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
 from artists import ends_of_bones
-from sklearn import clone, config_context
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
@@ -25,7 +23,6 @@ from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.model.departures import Departure
 
 PAPER = Skeleton.paper()
-NAMES = list(DirectionCosines(PAPER).get_feature_names_out())
 ENDS = {
     "left_thigh": [("left_hip", "left_knee")],
     "torso": [("pelvis", "neck")],
@@ -182,26 +179,6 @@ def test_a_reference_is_what_is_expected(bunch, pipe):
     table = find_departures(pipe, own[3:4], reference=own[:3], limit=1e-3)
     size = table.query("limb == 'left_forearm' and kind == 'angle'")["size"].max()
     assert first["size"] > 4 * size
-
-
-def test_tables_and_key_frames_are_accepted(bunch):
-    labels = list("abcdefgh")
-    frames = pd.concat(dict(zip(labels, map(pd.DataFrame, bunch.data), strict=True)))
-    steps = DirectionCosines(bunch.skeleton), ASpace(0.99), LinearSynchronizer(40), ActionModel()
-    drawn = []
-    for X, output in ((bunch.data, "default"), (frames, "pandas")):
-        with config_context(enable_metadata_routing=True):
-            steps[2].set_fit_request(keyframes=True).set_transform_request(keyframes=True)
-            pipe = make_pipeline(*map(clone, steps)).set_output(transform=output)
-            pipe.fit(X, keyframes=bunch.keyframes)
-        given = {"trial": 2, "limit": 1, "keyframes": bunch.keyframes}
-        drawn.append(SkeletonDisplay.from_departures(pipe, X, **given))
-    one, other = drawn
-    assert other.heading.startswith("Trial 2 ('c') is accepted.")
-    assert one.titles == other.titles
-    np.testing.assert_allclose(np.array(one.scenes), np.array(other.scenes), atol=1e-9)
-    with pytest.raises(ValueError, match=r"from_departures\(estimator, X, keyframes=\[...\]\)"):
-        SkeletonDisplay.from_departures(pipe, frames)
 
 
 def test_a_pipeline_without_aspace_on_axes_of_the_user(bunch):

@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    Match,
     Skeleton,
 )
 from sklearn_motionsync.datasets import make_bending
@@ -134,25 +133,6 @@ def test_place_heading_and_vertical_axis_have_no_effect():
         np.testing.assert_allclose(picture, pictures[0], atol=1e-9)
 
 
-def test_sides_of_the_acclaim_skeleton():
-    display = SkeletonDisplay(
-        [[np.random.default_rng(0).normal(size=(2, 31, 3))]], Skeleton.acclaim(), ["any"]
-    ).plot()
-    counts = {side: len(bones_drawn(display, 0, side)) for side in display.bones_[0]}
-    # Hip to toes are 5 bones a side, clavicle to fingers and thumb 7; 6 are in the middle.
-    assert counts == {"left": 12, "middle": 6, "right": 12}
-
-
-def test_titles_name_the_frames(bunch):
-    display = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=4)
-    last = len(bunch.data[0]) - 1
-    frames = [round(last * k / 3) for k in range(4)]
-    assert [axis.get_title() for axis in display.axes_] == [f"frame {f}" for f in frames]
-    for panel, frame in enumerate(frames):
-        alone = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=[frame])
-        np.testing.assert_array_equal(bones_drawn(display, panel), bones_drawn(alone, 0))
-
-
 def test_from_model_draws_mean_and_accepted_poses(pipe):
     display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), n_samples=5, azimuth=0)
     titles = [axis.get_title() for axis in display.axes_]
@@ -179,19 +159,6 @@ def test_bodies_move_together_after_synchronisation(bunch, pipe):
         assert times == [f"at {100 * at:.0f} % of the time"] * 2
     apart = {name: np.ptp(np.array(h), axis=1).mean() for name, h in heights.items()}
     assert apart["synchronised"] < 0.02 < 0.2 < apart["raw"]
-
-
-def test_a_match_draws_what_from_estimator_does(bunch, pipe):
-    points = pipe[:2].transform(bunch.data)
-    times = pipe[2].match(points).times
-    one = SkeletonDisplay.from_estimator(pipe, bunch.data, trials=[4, 1])
-    X, match = [bunch.data[4], bunch.data[1]], Match(times[[4, 1]])
-    other = SkeletonDisplay.from_trials(X, bunch.skeleton, match=match, names=["x", "y"])
-    for at in (0, 0.5, 1):
-        one.plot(at=at)
-        other.plot(at=at)
-        np.testing.assert_array_equal(bones_drawn(one, 1), bones_drawn(other, 1))
-    assert [label.get_text() for label in other.axes_[0].get_xticklabels()] == ["x", "y"]
 
 
 def test_the_view_follows_a_body_that_walks_far(bunch):
@@ -267,11 +234,6 @@ def test_animation_on_axes_of_the_user(bunch, pipe):
     assert all(len(axis.collections) == 4 for axis in axes), "the still figures are still there"
     assert plt.fignum_exists(figure.number)
     assert animation.to_jshtml().count("data:image/png;base64") == 2
-
-
-def test_pipelines_without_a_model_are_refused(pipe):
-    with pytest.raises(ValueError, match="no ActionModel in Pipeline"):
-        SkeletonDisplay.from_model(pipe[:3])
 
 
 def test_from_trials_keeps_the_pace(bunch):

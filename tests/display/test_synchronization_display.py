@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 from artists import segments, texts, ys
 from matplotlib.colors import to_rgba
-from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
 from sklearn_motionsync import (
@@ -89,30 +88,6 @@ def test_univariate_rows_and_tables_are_accepted(bunch):
             assert display.ylabels == ["hip"]
             np.testing.assert_array_equal(display.before[2][:, 0], frames[2]["hip"])
             np.testing.assert_array_equal(display.after[0, :, 0], linear.transform(frames)[0, :, 1])
-
-
-def test_pandas_output_is_drawn_as_arrays_are(bunch, pipe):
-    framed = clone(pipe).set_output(transform="pandas").fit(bunch.data)
-    one = SynchronizationDisplay.from_estimator(pipe, bunch.data)
-    other = SynchronizationDisplay.from_estimator(framed, bunch.data)
-    np.testing.assert_allclose(ys(one.after_[1]), ys(other.after_[1]), atol=1e-12)
-    for features in (None, ["pelvis_height"]):
-        one = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features)
-        other = ActionModelDisplay.from_estimator(framed, bunch.data, features=features)
-        found, expected = other.trials, one.trials
-        np.testing.assert_allclose(found, expected, atol=1e-12)
-
-
-def test_from_predictions_draws_what_from_estimator_does(bunch, pipe):
-    points = pipe[:2].transform(bunch.data)
-    one = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=1)
-    times = pipe[2].match(points).times
-    other = SynchronizationDisplay.from_predictions(points, times, features=1)
-    np.testing.assert_array_equal(ys(one.after_[0]), ys(other.after_[0]))
-    np.testing.assert_array_equal(ys(one.offsets_), ys(other.offsets_))
-    mean = pipe[2].transform(points)[:, :, 1].mean(axis=0)
-    np.testing.assert_allclose(other.pattern_[0].get_ydata(), mean)
-    assert "mean" in other.axes_[1].get_title()
 
 
 def test_unnamed_features_are_numbered(bunch):
@@ -319,18 +294,6 @@ def test_many_bands_are_lighter_than_few(bunch, pipe):
     assert 1 - (1 - many[0]) ** 40 < 0.5
     # The wide band of a single doubtful trial stays visible.
     assert one[7] > 4 * one[0]
-
-
-def test_gaps_and_keyframes_are_drawn_with_bands(bunch, pipe):
-    points = [x.copy() for x in pipe[:2].transform(bunch.data)]
-    points[3][5:9, 0] = np.nan
-    lows = np.array([[x[:, 0].argmax()] for x in pipe[:2].transform(bunch.data)])
-    sync = DenseSynchronizer(30).fit(points, keyframes=lows)
-    display = SynchronizationDisplay.from_estimator(sync, points, keyframes=lows, features=0)
-    check_bands(display, sync.match(points, keyframes=lows), 0.9)
-    assert len(display.keyframes_) == 2
-    assert np.isnan(segments(display.before_[0])[3]).any()
-    display.figure_.canvas.draw()
 
 
 # -- signals as recorded ---------------------------------------------------------------------
