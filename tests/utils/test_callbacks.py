@@ -155,14 +155,6 @@ def test_callbacks_reach_what_is_fitted_within(estimator, within, stage):
     assert not {"_skl_callbacks", "_parent_callback_ctx"} & vars(found[0]).keys()
 
 
-def test_a_callback_reaches_the_steps_of_a_detector():
-    recorder = Propagating()
-    detector = ActionDetector(make_pipeline(DENSE, ActionModel())).set_callbacks(recorder)
-    detector.fit(make_trials(6))
-    names = {context.estimator_name for _, context in recorder.contexts}
-    assert names == {"ActionDetector", "Pipeline", "DenseSynchronizer", "ActionModel"}
-
-
 def test_all_steps_of_a_pipeline_take_callbacks():
     """A step that does not is warned of, and warnings are errors."""
     steps = DirectionCosines(Skeleton.paper()), ASpace(3), LinearSynchronizer(), ActionModel()

@@ -10,14 +10,11 @@ import time
 import warnings
 from pathlib import Path
 
-import dask.array
-import dask.bag
 import distributed
 import joblib
 import numpy as np
 import pytest
 import sklearn_motionsync
-from dask import delayed
 from sklearn_motionsync import DenseSynchronizer
 
 import stream_dask
@@ -204,45 +201,6 @@ def test_stream_sends_model_once_and_portions_to_one_worker(
     assert len({task["worker"] for task in tasks.data}) == N_WORKERS
 
 
-def test_stream_reads_portions_as_workers_get_free(client, fitted, portions_of_walks):
-    read = []
-
-    def portions():
-        for portion in portions_of_walks:
-            read.append(portion)
-            yield portion
-
-    stream_dask.give(client, fitted)
-    answers = stream_dask.stream(client, portions(), method="match")
-    first = next(answers)
-    assert len(read) == 2 * N_WORKERS + 1
-    assert first["times"].tobytes() == fitted.match(portions_of_walks[0]).times.tobytes()
-    answers.close()
-
-
-def test_dask_bags_and_arrays_give_the_same(client, fitted, portions_of_walks, expected):
-    other = DenseSynchronizer(n_frames=50).fit(walks(60, 60, 8))
-    stream_dask.give(client, other)
-    stream_dask.give(client, fitted, name="walks")
-    few, stacked = portions_of_walks[:3], np.concatenate(expected[:3])
-    options = {"method": "transform", "model": "walks"}
-    bag = dask.bag.from_delayed([delayed(portion) for portion in few])
-    warped = bag.map_partitions(stream_dask.on_worker, **options).compute()
-    assert np.stack(warped).tobytes() == stacked.tobytes()
-    # Partitions are iterators here, and one is empty.
-    some = dask.bag.from_sequence([0, 2, None], npartitions=3).filter(lambda i: i is not None)
-    mapped = some.map(lambda i, walks: walks[i], few[0]).map_partitions(
-        stream_dask.on_worker, **options
-    )
-    assert np.stack(mapped.compute()).tobytes() == expected[0][[0, 2]].tobytes()
-    with pytest.raises(ValueError, match="The workers were given no 'wakls'"):
-        next(stream_dask.stream(client, few, model="wakls"))
-    array = dask.array.concatenate([dask.array.from_array(p, chunks=p.shape) for p in few])
-    known = {"dtype": array.dtype, "meta": np.empty((0, 0, 0)), "chunks": array.chunks}
-    warped = array.map_blocks(stream_dask.on_worker, **options, **known)
-    assert warped.compute().tobytes() == stacked.tobytes()
-
-
 @pytest.fixture
 def files(fitted, portions_of_walks, tmp_path):
     """The model, a folder of portions, and one for results."""
@@ -258,15 +216,6 @@ def assert_warped(folder, expected):
         assert np.load(folder / f"{i}.npy").tobytes() == each.tobytes()
 
 
-def test_files_are_read_by_workers(client, files, portions_of_walks, expected):
-    before = received(client)
-    with joblib.parallel_config(backend="dask"):
-        assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
-    # Only the names of the files.
-    assert (received(client) - before).sum() < 0.2 * portions_of_walks[0].nbytes
-    assert_warped(files[2], expected)
-
-
 def test_files_are_sent_by_the_script(client, files, expected, capsys):
     np.save(files[1] / "4.npy", np.full((2, 60, 8), np.nan))
     arguments = [*map(str, files), "--scheduler", client.scheduler.address]
@@ -277,14 +226,6 @@ def test_files_are_sent_by_the_script(client, files, expected, capsys):
     (files[2] / "2.npy").unlink()
     assert stream_dask.main(arguments) is None
     assert capsys.readouterr().out == "2.npy: done\n"
-    assert_warped(files[2], expected)
-
-
-def test_unreadable_file_is_named_after_results_of_earlier_ones(client, files, expected, capsys):
-    (files[1] / "4.npy").write_bytes((files[1] / "3.npy").read_bytes()[:500])
-    arguments = [*map(str, files), "--scheduler", client.scheduler.address]
-    assert re.match(r"\S*4\.npy: It cannot be read, is it whole", stream_dask.main(arguments))
-    assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
     assert_warped(files[2], expected)
 
 

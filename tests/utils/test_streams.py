@@ -78,13 +78,13 @@ def assert_synchronized(folder, fitted):
         assert (got.dtype, got.tobytes()) == (expected.dtype, expected.tobytes())
 
 
-def test_stream_equals_transform_with_one_or_two_jobs(files, fitted):
+def test_stream_equals_transform_with_one_or_two_jobs(files, fitted, capsys):
     model, walks, out = files
     assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
     assert_synchronized(out, fitted)
-    two = run(SCRIPT, model, walks, out.with_name("two"), "--n-jobs", 2)
-    assert (two.returncode, two.stderr) == (0, "")
-    assert two.stdout.split("\n")[:2] == ["a.npz: done", "b.npy: done"]
+    two = [*map(str, (model, walks, out.with_name("two"))), "--n-jobs", "2"]
+    assert stream_files.main(two) == 0
+    assert capsys.readouterr().out.split("\n")[:2] == ["a.npz: done", "b.npy: done"]
     assert_synchronized(out.with_name("two"), fitted)
 
 
@@ -100,21 +100,6 @@ def test_stream_equals_match_and_score_samples(files, fitted):
             assert found["distances"].tobytes() == match.distances.tobytes()
         scores = np.load(scored / f"{name[0]}.npy")
         assert scores.tobytes() == fitted.score_samples(portion).tobytes()
-
-
-def test_stream_stores_tables_as_arrays(files):
-    sync = DenseSynchronizer(n_frames=40).fit(walks(6, 0))
-    joblib.dump(sync, files[0])
-    assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
-    plain = results(files[2])
-    joblib.dump(sync.set_output(transform="pandas"), files[0])
-    tables = files[2].with_name("tables")
-    assert [wrong for _, wrong in stream_files.stream(*files[:2], tables)] == [None] * 4
-    assert {name: (x.shape, x.dtype, x.tobytes()) for name, x in results(tables).items()} == {
-        name: (x.shape, x.dtype, x.tobytes()) for name, x in plain.items()
-    }
-    with pytest.raises(ValueError, match=r"different lengths: give one that has a synchronizer"):
-        stream_files.answer(ASpace(2).fit(walks(6, 0)), "transform", walks(6, 0))
 
 
 # Killed when the third result is written, but not renamed yet.
@@ -146,15 +131,6 @@ def test_stream_continues_after_a_kill(files, fitted):
     assert {name: (out / name).stat().st_mtime_ns for name in done} == done
     assert_synchronized(out, fitted)
     assert list(stream_files.stream(*files)) == []
-
-
-def test_newer_portions_are_computed_again(files):
-    assert len(list(stream_files.stream(*files))) == 4
-    source, target = files[1] / "c.npz", files[2] / "c.npy"
-    np.savez(source, *walks(2, 5))
-    os.utime(target, (0, 0))
-    assert list(stream_files.stream(*files)) == [(source, None)]
-    assert len(np.load(target)) == 2
 
 
 def test_refused_and_unreadable_portions_do_not_stop_others(files, capsys):
@@ -204,10 +180,3 @@ def test_results_of_two_models_or_methods_are_not_mixed(files, fitted):
     note = json.loads((files[2] / "made_by.json").read_text(encoding="utf-8"))
     assert note["sklearn_motionsync"] == sklearn_motionsync.__version__
     assert_synchronized(files[2], fitted)
-
-
-def test_model_and_portions_are_opened_as_memory_maps(files):
-    fitted = stream_files.loaded(str(files[0]), "as it is")
-    assert stream_files.loaded(str(files[0]), "as it is") is fitted
-    assert isinstance(fitted[-1].pattern_, np.memmap)
-    assert isinstance(stream_files.read(files[1] / "b.npy"), np.memmap)
