@@ -12,7 +12,7 @@ import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Match, Skeleton
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.report import player, write_player, write_report
+from sklearn_motionsync.report import player, write_player
 
 BENDS = make_bending(5, n_frames=40, random_state=0)
 PIPE = make_pipeline(DirectionCosines(BENDS.skeleton), DenseSynchronizer(31)).fit(BENDS.data)
@@ -201,16 +201,6 @@ def test_the_longest_trial_is_as_long_as_all_fit(tmp_path, monkeypatch, most):
     longest = max((n for n in totals if totals[n] <= most), default=2)
     counts = write(tmp_path, X).data["player"]["counts"]
     assert counts == [min(longest, len(x)) for x in X]
-
-
-def test_a_report_has_the_same_player(tmp_path):
-    report = Elements(write_report(tmp_path / "b.html", PIPE, BENDS.data))
-    alone = write(tmp_path, match=PIPE)
-    for key in ("positions", "warps", "bones", "dots", "colors"):
-        assert report.data["player"][key] == alone.data["player"][key]
-    part = player.read_part("player.html")
-    assert part in report.page
-    assert part in alone.page
 
 
 # -- what is refused --------------------------------------------------------------------------
