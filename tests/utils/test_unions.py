@@ -5,7 +5,6 @@ import pytest
 from sklearn import clone, config_context
 from sklearn.pipeline import make_pipeline, make_union
 from sklearn_motionsync import (
-    ActionDetector,
     ActionModel,
     ASpace,
     DenseSynchronizer,
@@ -17,7 +16,6 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay, SynchronizationDisplay
 from sklearn_motionsync.metrics import SpreadScorer
-from sklearn_motionsync.model import find_departures
 
 BUNCH = make_bending(7, n_frames=40, random_state=2)
 K = list(BUNCH.keyframes)
@@ -31,10 +29,9 @@ def union_of(*views):
 
 BOTH = union_of(COSINES, POSITIONS)
 # The same union in other forms.
+OF_PIPELINES = union_of(make_pipeline(COSINES), make_pipeline("passthrough", POSITIONS))
 UNIONS = {
-    "first": BOTH,
-    "nested": make_pipeline(BOTH),
-    "of pipelines": union_of(make_pipeline(COSINES), make_pipeline("passthrough", POSITIONS)),
+    "nested, of pipelines": make_pipeline(OF_PIPELINES),
     "of unions": union_of(union_of(COSINES), POSITIONS),
 }
 
@@ -60,18 +57,6 @@ def test_keyframes_are_routed_past_a_union(union, routing):
     for times in (match.times, display.match.times):
         np.testing.assert_array_equal(times, expected.times)
     assert score == SpreadScorer()(pipe[-1], points, keyframes=K)
-
-
-def test_detector_of_a_union_takes_keyframes(union):
-    steps = LinearSynchronizer(30), ActionModel()
-    detector = ActionDetector(make_pipeline(union, *steps))
-    detector.fit(BUNCH.data, linearsynchronizer__keyframes=K)
-    plain = ActionDetector(make_pipeline(*steps))
-    points = union.fit_transform(BUNCH.data)
-    plain.fit(points, linearsynchronizer__keyframes=K)
-    np.testing.assert_array_equal(
-        detector.score_samples(BUNCH.data, keyframes=K), plain.score_samples(points, keyframes=K)
-    )
 
 
 def test_unknown_params_are_refused_after_a_union(union):
@@ -121,18 +106,6 @@ def test_departures_of_a_raised_arm_mark_its_limbs(reduced):
     expected = SkeletonDisplay.from_departures(plain, X, trial=1, frames=[3, 12])
     shown = SkeletonDisplay.from_departures(pipe, X, trial=1, frames=[3, 12])
     np.testing.assert_allclose(shown.scenes[1][0], expected.scenes[1][0], atol=1e-9)
-
-
-@pytest.mark.parametrize("reduced", [False, True])
-def test_departures_have_feature_names_of_both_views(reduced):
-    steps = [ASpace(0.95)] if reduced else []
-    pipe = make_pipeline(clone(BOTH), *steps, LinearSynchronizer(20), ActionModel())
-    still = np.repeat(BUNCH.data[0][:1], 40, axis=0)
-    table = find_departures(pipe.fit(BUNCH.data), [still])
-    names = set(pipe[0].get_feature_names_out())
-    assert len(names) == 79
-    for view in ("directioncosines__", "jointpositions__"):
-        assert any(name.startswith(view) for name in set(table["feature"]) & names)
 
 
 def test_figures_without_a_body_are_refused():
