@@ -45,9 +45,9 @@ def live(fitted):
 
 @pytest.fixture(scope="module")
 def walk():
-    """Frames of a minute of another person, and their phases."""
-    truth = paced(1500, begin=0.37)
-    noise = 0.02 * np.random.default_rng(1).standard_normal((1500, 3))
+    """Frames of ten cycles of another person, and their phases."""
+    truth = paced(600, begin=0.37)
+    noise = 0.02 * np.random.default_rng(1).standard_normal((600, 3))
     return pose(truth, 0.1) + noise, truth
 
 
@@ -59,7 +59,7 @@ def errors(found, truth):
 # -- cycles ---------------------------------------------------------------------------------
 
 
-def test_phase_goes_round_and_cycles_are_counted(fitted, walk):
+def test_phase_goes_round_cycles_are_counted_and_bounds_hold_the_truth(fitted, walk):
     x, truth = walk
     (found,) = fitted.track([x])
     off = errors(found, truth)[LENGTH:]
@@ -74,9 +74,19 @@ def test_phase_goes_round_and_cycles_are_counted(fitted, walk):
     assert found.confidence[LENGTH:].min() > 0.9
     assert found.phase.min() >= 0
     assert found.phase.max() <= P - 1
+    assert (found.lower <= found.phase).all()
+    assert (found.phase <= found.upper).all()
+    assert (found.upper - found.lower).max() <= P
+    # At the beginning of a cycle they reach into the one before, at its end into the next.
+    near = (truth + np.round(found.phase / (P - 1) - truth)) * (P - 1)
+    after = slice(LENGTH, None)
+    inside = (found.lower <= near) & (near <= found.upper)
+    assert inside[after].mean() > 0.85
+    assert found.lower[after].min() < 0
+    assert found.upper[after].max() > P - 1
 
 
-@pytest.mark.parametrize("begin", [0.0, 0.25, 0.6, 0.95])
+@pytest.mark.parametrize("begin", [0.0, 0.25, 0.95])
 def test_it_begins_anywhere(fitted, begin):
     truth = paced(200, begin, 0.0)
     (found,) = fitted.track([pose(truth)])
@@ -140,21 +150,6 @@ def test_another_pace_is_followed(fitted):
         # The delay of the filters is that of the mean pace.
         assert np.median(np.abs(errors(found, truth)[200:])) < 4
         assert np.median(found.rate[200:]) == pytest.approx(pace, rel=0.1)
-
-
-def test_bounds_of_cycles_hold_the_truth(fitted, walk):
-    x, truth = walk
-    (found,) = fitted.track([x])
-    assert (found.lower <= found.phase).all()
-    assert (found.phase <= found.upper).all()
-    assert (found.upper - found.lower).max() <= P
-    # At the beginning of a cycle they reach into the one before, at its end into the next.
-    near = (truth + np.round(found.phase / (P - 1) - truth)) * (P - 1)
-    after = slice(LENGTH, None)
-    inside = (found.lower <= near) & (near <= found.upper)
-    assert inside[after].mean() > 0.85
-    assert found.lower[after].min() < 0
-    assert found.upper[after].max() > P - 1
 
 
 def test_confidence_is_low_for_standing_still_and_other_movements(fitted, walk):
@@ -373,28 +368,25 @@ def test_a_pause_is_no_new_attempt(single, at, sway):
     assert np.abs(found.phase - phase[order])[-20:].max() < 6
 
 
-def test_time_left_begins_anew_with_the_movement(single):
-    live, x, _ = single
-    live = copy.deepcopy(live)
-    for frame in np.concatenate([x[:30], x[:33]]):
-        now = live.step(frame)
-    assert now.cycle == 1
-    assert live.time_left() == pytest.approx(32, abs=7)
-
-
 def test_attempts_of_streams_equal_those_alone(single):
     live, x, _ = single
     live = copy.deepcopy(live)
     again, once = np.concatenate([x[:27], x])[:65], x.copy()
     once[20:24] = np.nan
     both = [live.step(frames) for frames in np.stack([again, once], axis=1)]
-    for i, alone in enumerate(live.track([again, once])):
+    alone = live.track([again, once])
+    for i, one in enumerate(alone):
         for name in ("phase", "rate", "confidence", "cycle"):
             found = [getattr(step, name)[i] for step in both]
-            np.testing.assert_allclose(found, getattr(alone, name), atol=1e-6)
+            np.testing.assert_allclose(found, getattr(one, name), atol=1e-6)
     assert both[-1].cycle.tolist() == [1, 0]
+    assert live.history.phase.shape == (65, 2)
+    # One begins again, the other stays at its end.
     live.reset(0)
-    assert live.step(np.stack([x[0], x[0]])).cycle.tolist() == [0, 0]
+    after = [live.step(np.stack([frame, once[-1]])) for frame in again[:26]]
+    assert after[0].cycle.tolist() == [0, 0]
+    assert all(step.phase[1] == P - 1 for step in after[5:])
+    np.testing.assert_allclose([step.phase[0] for step in after], alone[0].phase[:26], atol=1.5)
 
 
 def test_second_attempts_of_real_people_held_out(real_data):
@@ -408,7 +400,7 @@ def test_second_attempts_of_real_people_held_out(real_data):
             for held in (False, True)
         )
         live = OnlineSynchronizer(DenseSynchronizer(100)).fit(features.fit_transform(known))
-        new = features.transform(new)
+        new = features.transform(new[::2])
         first = [round(0.4 * (len(x) - 1)) + 1 for x in new]
         twice = [np.concatenate([x[:k], x]) for x, k in zip(new, first, strict=True)]
         once = live.track(new)

@@ -9,12 +9,10 @@ import pytest
 from scipy.special import log_softmax
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
-from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
-from sklearn_motionsync.datasets import load_trials
+from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
 from sklearn_motionsync.live import OnlineSynchronizer
 from sklearn_motionsync.live.causal import CausalDerivative
-from sklearn_motionsync.live.stream import Resampler, Streams, check_times
+from sklearn_motionsync.live.stream import Resampler, Streams, check_times, gains_of, phase_bounds
 from sklearn_motionsync.live.synchronizer import Reference, calibrate
 from sklearn_motionsync.matching.matcher import Features
 from sklearn_motionsync.matching.units import Unit
@@ -78,34 +76,6 @@ def test_phase_and_rate_follow_known_warps(fitted, n_frames, bend):
     assert np.median(np.abs(found.rate - rate)[n_frames // 4 :]) < 0.25
     # Confidence is lower at paces and bends beyond those of the training set.
     assert np.mean(found.confidence) > (0.8 if bend == 0 else 0.3)
-
-
-def test_phase_of_new_person_is_near_offline_path(real_data):
-    clips, n_frames = load_trials(real_data / "hdm05" / "hdm05_positions.npz"), 100
-    action, other = "grabHighR", "depositFloorR"
-
-    def load(action, held_out):
-        """Clips at 30 frames a second, by one actor or by the others."""
-        chosen = (clips.target == action) & ((clips.actor == "bk") == held_out)
-        return [clips.data[i][::4] for i in np.flatnonzero(chosen)]
-
-    features = make_pipeline(DirectionCosines(clips.skeleton), ASpace())
-    training = features.fit_transform(load(action, held_out=False))
-    X = features.transform(load(action, held_out=True))
-    live = OnlineSynchronizer(DenseSynchronizer(n_frames)).fit(training)
-    errors, tracks = [], live.track(X)
-    for x, times, found in zip(X, live.synchronizer_.match(X).times, tracks, strict=True):
-        clock = np.linspace(0, n_frames - 1, len(x))
-        offline = np.interp(clock, times + 1e-9 * np.arange(n_frames), np.arange(n_frames))
-        errors.append(np.abs(found.phase - offline)[clock >= n_frames / 5])
-    assert np.median(np.concatenate(errors)) < 3.5
-    # The confidence of another action is less than half of that.
-    others = live.track(features.transform(load(other, held_out=True)))
-    right, wrong = (
-        np.median([found.confidence[len(found.phase) // 2 :].mean() for found in some])
-        for some in (tracks, others)
-    )
-    assert wrong < right / 2
 
 
 def test_track_equals_step_and_does_not_look_ahead(fitted, live):
@@ -287,20 +257,6 @@ def test_estimates_of_streams_equal_their_definitions():
 # -- streams and sessions -----------------------------------------------------------------
 
 
-def test_streams_side_by_side_equal_streams_alone(fitted, live):
-    x, y = trial(60, 0.4, 0.02, 1)[0], trial(60, -0.4, 0.02, 2)[0]
-    x[10, 2] = np.nan
-    both, alone = step_all(live, np.stack([x, y], axis=1)), fitted.track([x, y])
-    for i, one in enumerate(alone):
-        np.testing.assert_allclose([step.phase[i] for step in both], one.phase, atol=1e-9)
-        np.testing.assert_allclose([step.confidence[i] for step in both], one.confidence, atol=1e-9)
-    assert live.history.phase.shape == (60, 2)
-    live.reset(1)
-    again = [live.step(np.stack([x[-1], frame])) for frame in y[:30]]
-    assert all(step.phase[0] == P - 1 for step in again[5:])
-    np.testing.assert_allclose([step.phase[1] for step in again], alone[1].phase[:30], atol=1.5)
-
-
 def test_reset_of_one_stream_does_not_interpolate_from_its_last_frame(fitted, live):
     x, _ = trial(60, 0.0, 0.02, 6)
     times, first, second = 1.7 * np.arange(20), x[::3], x[1::3]
@@ -397,7 +353,8 @@ def test_constant_and_equal_training_trials():
 
 
 def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
-    """By frames of streams: the likeliest temperature, and the median of the largest mean costs.
+    """By frames of streams: the likeliest temperature, the median of the largest mean costs, and
+    the lowest temperature whose intervals hold nine tenths of the phases.
 
     Of 30 trials 24 are matched; of a long one every second moment counts.
     """
@@ -412,7 +369,7 @@ def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
 
     energy = np.square(reference_of(live.mean_).moving).sum(axis=1).mean()
     temperatures = energy * np.geomspace(0.01, 1e3, 41)
-    scores, largest = np.zeros(41), []
+    scores, shares, largest = np.zeros(41), np.zeros(41), []
     for i in sorted({round(k * 29 / 23) for k in range(24)}):
         others, x = np.delete(warped, i, axis=0).mean(axis=0), X[i]
         streams, rows, mean_costs = Streams(reference_of(others), 1, 3), [], []
@@ -426,14 +383,17 @@ def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
         clock = times / (len(x) - 1) * last
         phases = np.interp(clock, match.times[i] + 1e-9 * np.arange(P), np.arange(P))
         right = np.round(2 * phases).astype(int)
-        every = 2 if i == 0 else 1
+        told = np.minimum(np.argmin(rows, axis=1) / 2, last)
+        gains, every = gains_of(np.array(rows))[:, ::2], 2 if i == 0 else 1
         for k, temperature in enumerate(temperatures):
             found = log_softmax(-np.array(rows) / temperature, axis=1)[np.arange(len(rows)), right]
             scores[k] += np.maximum(found[::every], np.log(1e-12)).mean()
-    progress = Progress(None, verbose=0)
-    temperature, typical_cost, _ = calibrate(reference_of, X, warped, match.times, progress)
-    assert temperature == pytest.approx(temperatures[scores.argmax()])
-    assert typical_cost == pytest.approx(np.median(largest), rel=1e-6)
+            lower, upper = phase_bounds(gains, np.full(len(rows), temperature), told, last)
+            shares[k] += np.mean(((lower <= right / 2) & (right / 2 <= upper))[::every]) / 24
+    found = calibrate(reference_of, X, warped, match.times, Progress(None, verbose=0))
+    expected = temperatures[scores.argmax()], np.median(largest)
+    np.testing.assert_allclose(found[:2], expected, rtol=1e-6)
+    assert found[2] == pytest.approx(1.5 * temperatures[np.flatnonzero(shares >= 0.9)[0]])
 
 
 # -- refusals -----------------------------------------------------------------------------
@@ -498,10 +458,10 @@ def test_time_stamps_that_come_twice_are_refused():
 
 def test_phases_do_not_depend_on_the_origin_of_time():
     """1e17 is a time in nanoseconds, where the next number is 16 later."""
-    x, _ = trial(60, 0.3, 0.02, 4)
-    times = np.arange(0, 960, 16.0)
+    x, _ = trial(20, 0.3, 0.02, 4)
+    times = np.arange(0, 320, 16.0)
     slow = OnlineSynchronizer(LinearSynchronizer()).fit(
-        [np.repeat(trial(50, b, 0.02, i)[0], 16, axis=0) for i, b in enumerate((-0.2, 0.2))]
+        [np.repeat(trial(18, b, 0.02, i)[0], 16, axis=0) for i, b in enumerate((-0.2, 0.2))]
     )
     (expected,), (found,) = slow.track([x], [times]), slow.track([x], [times + 1e17])
     np.testing.assert_array_equal(found.phase, expected.phase)
