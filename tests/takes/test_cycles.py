@@ -4,14 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn import clone
-from sklearn.model_selection import GroupKFold, cross_val_score
-from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import estimator_checks
 from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
-    DenseSynchronizer,
     FrameWise,
     Skeleton,
     to_frame,
@@ -136,16 +131,7 @@ def test_takes_of_other_frame_rates_are_cut_at_the_same_phase(gait, fitted):
         CycleSegmenter(start=HIP, period=(20, 200)).fit(tables)
 
 
-def test_a_pattern_of_constant_periods_is_blurred():
-    take, _ = slowing_take()
-    sizes = [
-        np.square(CycleSegmenter(start=0, refine=refine).fit(take).pattern_).mean()
-        for refine in (False, True)
-    ]
-    assert sizes[0] < 0.9 * sizes[1]
-
-
-@pytest.mark.parametrize("size", [1e-6, 1, 1e6])
+@pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_score_is_the_cosine_with_the_pattern(size):
     take, pattern = (
         SampledStretch(slowing_take()[0], 100),
@@ -441,23 +427,17 @@ def assert_same(answer, expected):
     pd.testing.assert_frame_equal(locations, other)
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        tuple,
-        np.stack,
-        lambda X: [x.tolist() for x in X],
-        lambda X: [np.asfortranarray(x) for x in X],
-        lambda X: [pd.DataFrame(x, columns=list("hkaf")) for x in X],
-        lambda X: to_frame(X, columns=list("hkaf")),
-    ],
-)
-def test_segment_gives_equal_results_for_every_kind_of_collection(kind, gait):
+def test_segment_gives_equal_results_for_every_kind_of_collection(gait):
     X = [x[:380] for x in gait.data[:2]]
     before = [x.copy() for x in X]
-    segmenter = CycleSegmenter(start=HIP).fit(kind(X))
-    assert_same(segmenter.segment(kind(X)), fit_and_segment(CycleSegmenter(start=HIP), X))
+    expected = fit_and_segment(CycleSegmenter(start=HIP), X)
+    for given in (np.stack(X), to_frame(X, columns=list("hkaf"))):
+        assert_same(fit_and_segment(CycleSegmenter(start=HIP), given), expected)
     assert all(map(np.array_equal, X, before))
+    takes = to_frame(X, trials=["ann", "bob"], columns=list("hkaf"))
+    cycles, locations = fit_and_segment(CycleSegmenter(start="h"), takes)
+    assert set(locations["take"]) == {"ann", "bob"}
+    assert to_frame(cycles).index.names == ["trial", "part", "frame"]
 
 
 def test_a_single_take_is_a_list_of_one(gait):
@@ -486,17 +466,6 @@ def test_float32_is_cut_at_the_same_frames(gait, fitted):
     cycles, locations = clone(fitted).fit(single[:3]).segment(single[3:])
     assert all(c.dtype == np.float32 for c in cycles)
     assert (locations["start"] - expected[1]["start"]).abs().max() <= 1
-
-
-def test_cycles_work_in_pipelines_and_cross_validation(gait):
-    takes = to_frame(gait.data, trials=gait.person, columns=gait.feature_names)
-    cycles, locations = fit_and_segment(CycleSegmenter(start="hip_flexion"), takes)
-    assert set(locations["take"]) == set(gait.person)
-    df = to_frame(cycles)
-    assert df.index.names == ["trial", "part", "frame"]
-    pipe = make_pipeline(ASpace(3), DenseSynchronizer(30), ActionModel())
-    scores = cross_val_score(pipe, cycles, groups=locations["take"], cv=GroupKFold(3))
-    assert np.isfinite(scores).all()
 
 
 def test_a_feature_that_counts_the_time_is_warned_of():
