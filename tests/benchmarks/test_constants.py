@@ -91,11 +91,6 @@ def test_a_default_is_switched(constants):
     assert DenseSynchronizer().consensus == 8
 
 
-def test_halves_and_doubles(constants):
-    assert constants.scaled(0.3, 0.5) == 0.15
-    assert [constants.scaled(n, 0.5) for n in (1, 7, 8)] == [1, 3, 4]
-
-
 def test_a_switched_constant_changes_warps_and_leaves_nothing_behind(constants):
     cells = {(0.05, 16): [constants.known_warps(0, 0.5, 2.0, 0.05, n_features=16)]}
     one = constants.Constant(constants.PARAMETERS, "consensus", "", off=0)
