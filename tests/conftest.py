@@ -32,6 +32,16 @@ def benchmark():
         yield importlib.import_module
 
 
+@pytest.fixture(scope="module")
+def known_warps(benchmark):
+    """Copies of a random movement with gains and known warps, of rates from 0.5 to 2."""
+
+    def make(seed, noise, n_features=16, n=8):
+        return benchmark("accuracy").known_warps(seed, 0.5, 2.0, noise, n=n, n_features=n_features)
+
+    return make
+
+
 @pytest.fixture(scope="session")
 def bends(real_data):
     """The 24 real bends of four actors: joint positions."""

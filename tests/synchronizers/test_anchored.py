@@ -140,13 +140,11 @@ def test_the_disparity_space_shows_the_anchored_path(bunch):
     assert abs(moment + free.path[moment] - wanted) > 1
 
 
-def test_results_do_not_depend_on_order_jobs_or_company(bunch):
+def test_results_do_not_depend_on_company(bunch):
     K = bunch.keyframes[:, [1, 3]].copy()
     K[6] = np.nan
     sync = DenseSynchronizer(P, pattern=0).fit(bunch.data, keyframes=K)
     times = sync.match(bunch.data, keyframes=K).times
-    jobs = clone(sync).set_params(n_jobs=2).fit(bunch.data, keyframes=K)
-    np.testing.assert_array_equal(jobs.match(bunch.data, keyframes=K).times, times)
     alone = sync.match(bunch.data[5:6], keyframes=K[5:6]).times[0]
     np.testing.assert_array_equal(alone, times[5])
 
@@ -158,20 +156,6 @@ def test_a_sample_takes_its_own_keyframes(bunch):
     np.testing.assert_allclose(sync.keyframes_, own)
     with pytest.raises(ValueError, match="list of 9 arrays"):
         DenseSynchronizer(P, max_fit=5).fit(bunch.data, keyframes=K[:5])
-
-
-def test_seconds_and_frames_are_the_same(bunch):
-    K, rates = bunch.keyframes[:, [1, 3]], np.linspace(50, 120, 9)
-    for rate in (100.0, rates):
-        seconds = K / np.broadcast_to(rate, 9)[:, np.newaxis]
-        given = {"keyframes": seconds, "frame_rate": rate}
-        for sync in (DenseSynchronizer(P), LinearSynchronizer(P)):
-            expected = clone(sync).fit(bunch.data, keyframes=K).match(bunch.data, keyframes=K)
-            found = sync.fit(bunch.data, **given).match(bunch.data, **given)
-            np.testing.assert_allclose(found.times, expected.times, atol=1e-9)
-            np.testing.assert_array_equal(
-                sync.transform(bunch.data, **given), found.warp(bunch.data)
-            )
 
 
 def test_parts_follow_a_body_that_is_anchored(bunch):
@@ -198,25 +182,23 @@ def test_the_live_synchronizer_learns_from_keyframes(bunch):
     assert live.track(bunch.data[:1])[0].phase[-1] > 0.8 * (P - 1)
 
 
-def test_rows_of_a_table_are_those_of_the_trials(bunch):
+def test_every_trial_has_one_row_of_a_table(bunch):
     names = [f"trial {i}" for i in range(9)]
     X = pd.concat([pd.DataFrame(x) for x in bunch.data], keys=names)
     K = pd.DataFrame(bunch.keyframes[:, [2]], index=names)
-    sync = DenseSynchronizer(P).fit(X, keyframes=K)
-    expected = DenseSynchronizer(P).fit(bunch.data, keyframes=bunch.keyframes[:, [2]])
-    np.testing.assert_array_equal(sync.pattern_, expected.pattern_)
-    times = sync.match(X, keyframes=K).times
-    np.testing.assert_array_equal(sync.match(X, keyframes=K[::-1]).times, times)
-    np.testing.assert_array_equal(sync.match(X.loc[names[4:]], keyframes=K).times, times[4:])
+    sync = LinearSynchronizer(P).fit(X, keyframes=K)
     for table, count in ((K[1:], 0), (pd.concat([K, K[:1]]), 2)):
         with pytest.raises(ValueError, match=f"labelled 'trial 0', and keyframes has {count} row"):
             sync.match(X, keyframes=table)
 
 
 BAD = {
+    "a number": (lambda K: 3, "list of 9 arrays .*; got 3"),
+    "a number for a row": (lambda K: [K[0], 3, *K[2:]], "Trial 1: "),
     "too few rows": (lambda K: K[:4], "list of 9 arrays"),
     "another count": (lambda K: [*K[:3], [5.0], *K[4:]], "Trial 3: .* 2 increasing"),
     "falling": (lambda K: [*K[:2], K[2][::-1], *K[3:]], "Trial 2: .* increasing"),
+    "first frame": (lambda K: [[0.0, 9.0], *K[1:]], "Trial 0: .* both excluded"),
     "outside": (lambda K: [*K[:8], [10.0, 1e4]], "Trial 8: .* between 0 and"),
     "in seconds": (lambda K: K / 1000, "Trial 0: .* look like seconds"),
     "none known": (lambda K: K * [1, np.nan], "key-frame 1 is known in no trial"),

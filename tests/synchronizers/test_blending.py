@@ -69,16 +69,6 @@ def standing(n_frames):
 # -- a weight of one ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("i", [0, 5, 11])
-def test_weight_of_one_gives_the_trial_back(bending, pipe, i):
-    X = bending.data[:12]
-    found = blend_trials(pipe, X, np.eye(12)[i])
-    assert found.shape == X[i].shape
-    np.testing.assert_allclose(found, X[i], atol=1e-12)
-    cosines = pipe[0]
-    np.testing.assert_allclose(*cosines.transform([found, X[i]]), atol=1e-12)
-
-
 @pytest.mark.parametrize("n_dims", [3, 2])
 @pytest.mark.parametrize("name", FORMATS)
 def test_weight_of_one_gives_bodies_of_every_format_back(name, n_dims):

@@ -25,20 +25,6 @@ def warps():
     return [warped(n, power) for n, power in ((60, 1.0), (80, 1.2), (50, 0.85), (70, 1.1))]
 
 
-def keyframe_errors(sync, X, keyframes):
-    """Frames between where a key-frame of the pattern lands and where it is."""
-    n, frames = sync.pattern_index_, np.arange(sync.n_frames_)
-    on_clock = [k * (sync.n_frames_ - 1) / (len(x) - 1) for k, x in zip(keyframes, X, strict=True)]
-    times = sync.match(X).times
-    return np.array(
-        [
-            np.abs(np.interp(on_clock[n], frames, t) - k)
-            for m, (t, k) in enumerate(zip(times, on_clock, strict=True))
-            if m != n
-        ]
-    )
-
-
 # -- the clock --------------------------------------------------------------------------
 
 
@@ -101,36 +87,6 @@ def test_no_offset_is_linear_normalisation(warps):
     np.testing.assert_array_equal(dense.transform(warps), linear.transform(warps))
 
 
-def test_known_warp_is_recovered():
-    """x_m(t) = curve(t^1.2) meets x_n(t) = curve(t) at tau = t^(1 / 1.2)."""
-    P = 101
-    t = np.linspace(0, 1, P)
-    sync = DenseSynchronizer(P, pattern=0, smoothness=1e-4)
-    found = sync.fit([curve(t), curve(t**1.2)]).match([curve(t**1.2)]).times[0]
-    assert np.abs(found - 100 * t ** (1 / 1.2)).mean() < 0.2
-
-
-def test_keyframe_errors_of_bending_are_a_fifth_of_linear(bending, bending_aspace):
-    linear, dense = (
-        keyframe_errors(s.fit(bending_aspace), bending_aspace, bending.keyframes).mean()
-        for s in (LinearSynchronizer(100), DenseSynchronizer(100))
-    )
-    assert linear > 4
-    assert 5 * dense < linear
-
-
-@pytest.mark.parametrize("metric", ["learned", None])
-def test_smoothness_is_a_pure_number(metric, warps):
-    """Units and offsets of the features change nothing."""
-    a = DenseSynchronizer(40, metric=metric).fit(warps)
-    b = DenseSynchronizer(40, metric=metric).fit([1000 * x + 5e4 for x in warps])
-    # What is compared in the learnt metric has no unit.
-    np.testing.assert_allclose(b.mu_, (1 if metric else 1e6) * a.mu_)
-    assert a.pattern_index_ == b.pattern_index_
-    X, Y = warps, [1000 * x + 5e4 for x in warps]
-    np.testing.assert_allclose(a.match(X).offsets, b.match(Y).offsets, atol=1e-6)
-
-
 @pytest.mark.parametrize(
     ("n_frames", "max_offset", "reach"),
     [(100, 0.29, 29), (100, 0.285, 28), (41, 0.25, 10), (60, 0.01, 0), (60, 1, 45)],
@@ -181,17 +137,6 @@ def test_warps_equal_smoothed_votes_of_paths(settings, warps):
         times = np.clip(frames + np.clip(offsets, -reach, reach), 0, P - 1)
         expected = np.maximum.accumulate(times) if m != 1 else frames
         np.testing.assert_allclose(sync.match(X).times[m], expected, atol=1e-9)
-
-
-def test_more_smoothness_is_smoother(warps):
-    changes = [
-        np.abs(
-            np.diff(DenseSynchronizer(40, smoothness=s, **PAPER).fit(warps).match(warps).offsets)
-        ).sum()
-        for s in (0, 0.1, 1, 1000)
-    ]
-    assert changes == sorted(changes, reverse=True)
-    assert changes[-1] == 0
 
 
 # -- bad input --------------------------------------------------------------------------

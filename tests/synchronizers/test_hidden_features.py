@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     TimingChannel,
 )
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.display import MetricDisplay, SynchronizationDisplay, TrellisDisplay
 from sklearn_motionsync.metrics import SpreadScorer
 
 P = 40
@@ -167,11 +166,7 @@ def test_a_feature_that_is_never_seen_is_refused_by_its_name():
     assert np.isfinite(clone(DENSE).fit(WHOLE).match(X).times).all()
 
 
-def test_infinity_and_gaps_of_a_pattern_are_refused():
-    X = [x.copy() for x in GAPPY]
-    X[4][3, 2] = np.inf
-    with pytest.raises(ValueError, match="Trial 4, frame 3, feature 2 is infinity"):
-        clone(DENSE).fit(X)
+def test_gaps_of_a_pattern_are_refused():
     with pytest.raises(ValueError, match=r"The pattern, frame \d+, feature \d is NaN"):
         DenseSynchronizer(P, pattern=GAPPY[0][:, :]).fit(GAPPY)
 
@@ -309,20 +304,6 @@ def test_wrong_confidence_is_refused(case):
 
 
 # -- displays, lags and tables --------------------------------------------------------------
-
-
-def test_displays_of_trials_with_gaps():
-    sync = clone(DENSE).fit(GAPPY)
-    shown = SynchronizationDisplay.from_estimator(sync, GAPPY, features=[3, 4])
-    assert shown.titles[1] == f"the pattern, trial {sync.pattern_index_}"
-    # Drawn as a gap: matplotlib leaves the hidden points out.
-    hidden = np.isnan(shown.after[0, :, 0])
-    assert hidden.any()
-    paths = shown.after_[0].get_paths()[0].vertices
-    np.testing.assert_array_equal(np.isnan(paths[:, 1]), hidden)
-    assert np.isfinite(shown.pattern_[0].get_ydata()).all()
-    TrellisDisplay.from_estimator(sync, GAPPY, trial=1)
-    MetricDisplay.from_estimator(sync)
 
 
 def test_lags_and_tables_of_trials_with_gaps():

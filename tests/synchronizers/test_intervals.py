@@ -16,7 +16,7 @@ from sklearn_motionsync import (
     PartSynchronizer,
     SynchronizationWarning,
 )
-from sklearn_motionsync.datasets import load_trials, make_bending
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.inputs import validation
 
 P = 60
@@ -25,15 +25,6 @@ P = 60
 @pytest.fixture(scope="module")
 def fitted(bending_aspace):
     return DenseSynchronizer(P).fit(bending_aspace[:12])
-
-
-def true_warps(bunch, pattern, n_frames):
-    """The times (n, P) at which all trials show what one of them does."""
-    clocks = [np.linspace(0, n_frames - 1, len(phase)) for phase in bunch.times]
-    frames = np.arange(n_frames)
-    phases = np.interp(frames, clocks[pattern], bunch.times[pattern])
-    pairs = zip(bunch.times, clocks, strict=True)
-    return np.array([np.interp(phases, phase, clock) for phase, clock in pairs])
 
 
 def coverage(match, truth, nominal=0.9):
@@ -180,30 +171,11 @@ def test_single_precision_and_several_jobs(bending_aspace):
 # -- coverage -----------------------------------------------------------------------------
 
 
-def test_coverage_of_made_bendings():
-    """True times of every frame; refined warps."""
-    found = {nominal: [] for nominal in (0.8, 0.9, 0.95)}
-    for seed in range(2):
-        bunch = make_bending(16, noise=0.005, random_state=seed)
-        pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace())
-        X = pipe.fit_transform(bunch.data)
-        sync = DenseSynchronizer(101, refine=True).fit(X)
-        others = np.delete(np.arange(16), sync.pattern_index_)
-        match = sync.match([X[i] for i in others])
-        assert not match.doubtful.any()
-        truth = true_warps(bunch, sync.pattern_index_, 101)[others]
-        for nominal, shares in found.items():
-            shares.append(coverage(match, truth, nominal))
-    for nominal, shares in found.items():
-        assert -0.05 < np.mean(shares) - nominal < 0.125, (nominal, shares)
-
-
 @pytest.mark.parametrize(("noise", "n_features"), [(0.005, 16), (0.05, 4)])
-def test_coverage_of_known_warps_of_one_source(noise, n_features, benchmark):
-    known_warps = benchmark("accuracy").known_warps
+def test_coverage_of_known_warps_of_one_source(noise, n_features, known_warps):
     shares, widths = [], []
     for seed in range(4):
-        X, truth = known_warps(seed, 0.5, 2.0, noise, n_features=n_features)
+        X, truth = known_warps(seed, noise, n_features)
         match = DenseSynchronizer(100, pattern=0).fit(X).match(X[1:])
         shares.append(coverage(match, truth[1:]))
         lower, upper = match.interval()

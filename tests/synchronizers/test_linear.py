@@ -95,21 +95,6 @@ def test_timing_errors_with_keyframes_and_without(bending, bending_aspace):
 # -- bad key-frames -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("keyframes", "message"),
-    [
-        (3, "list of 2 arrays .*; got 3"),
-        ([[2, 5], [2, 9]], "Trial 1: .* both excluded"),
-        ([[0, 5], [2, 5]], "Trial 0: "),
-        ([[2, 5], 3], "Trial 1: "),
-    ],
-)
-def test_fit_refuses_invalid_keyframes(keyframes, message):
-    X = [np.arange(10.0)[:, None]] * 2
-    with pytest.raises(ValueError, match=message):
-        LinearSynchronizer().fit(X, keyframes=keyframes)
-
-
 def test_transform_needs_keyframes_after_a_fit_with_them(bending):
     sync = LinearSynchronizer().fit(bending.data, keyframes=bending.keyframes)
     with pytest.raises(ValueError, match="give those of these trials too"):

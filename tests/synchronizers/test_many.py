@@ -17,6 +17,7 @@ from sklearn_motionsync import (
     to_frame,
 )
 from sklearn_motionsync.inputs import validation as reading
+from sklearn_motionsync.matching import median
 from sklearn_motionsync.synchronizers import learning, training
 
 from shift_synchronizer import ShiftSynchronizer
@@ -99,9 +100,10 @@ def test_paths_of_long_trials_take_little_memory():
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 @pytest.mark.parametrize(("settings", "n_jobs"), [({}, 2), ({"pattern": 3}, None), (PAPER, None)])
 def test_portions_change_nothing(monkeypatch, settings, n_jobs):
-    X = walks(110, 20, dtype=np.float32)
+    X = walks(26, 20, dtype=np.float32)
+    monkeypatch.setattr(median, "MOST_REFERENCES", 20)
     expected = DenseSynchronizer(**settings).fit(X)
-    monkeypatch.setattr(learning, "PORTION_CELLS", 20_000)
+    monkeypatch.setattr(learning, "PORTION_CELLS", 5_000)
     sync = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
     assert sync.pattern_index_ == expected.pattern_index_
     assert sync.mu_ == expected.mu_

@@ -6,14 +6,9 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.exceptions import NotFittedError
-from sklearn.model_selection import GridSearchCV
-from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
-    ActionModel,
     ASpace,
     DenseSynchronizer,
-    DirectionCosines,
     LinearSynchronizer,
     Match,
     to_frame,
@@ -165,25 +160,6 @@ def test_match_copies_given_times():
     assert not match.offsets.any()
 
 
-def test_from_estimator_of_pipelines_and_searches(bending):
-    steps = DirectionCosines(bending.skeleton), ASpace(3), DenseSynchronizer(30), ActionModel()
-    pipe = make_pipeline(*steps).fit(bending.data[:6])
-    match = Match.from_estimator(pipe, bending.data[6:9])
-    expected = pipe[2].match(pipe[:2].transform(bending.data[6:9]))
-    for one, other in zip(match, expected, strict=True):
-        np.testing.assert_array_equal(one, other)
-    alone = Match.from_estimator(pipe[2], pipe[:2].transform(bending.data[6:9]))
-    np.testing.assert_array_equal(alone.times, expected.times)
-    search = GridSearchCV(pipe, {"aspace__n_components": [3]}, cv=2).fit(bending.data[:6])
-    np.testing.assert_array_equal(
-        Match.from_estimator(search, bending.data[6:9]).times, expected.times
-    )
-    with pytest.raises(ValueError, match="There is no synchronizer in Pipeline"):
-        Match.from_estimator(pipe[:2], bending.data)
-    with pytest.raises(NotFittedError):
-        Match.from_estimator(DenseSynchronizer(), bending.data)
-
-
 def test_warp_takes_every_kind_of_collection(matched):
     points, _, match = matched
     expected = match.warp(points)
@@ -193,12 +169,6 @@ def test_warp_takes_every_kind_of_collection(matched):
     objects[:] = points
     for X in (frames, to_frame(frames), objects):
         np.testing.assert_array_equal(match.warp(X), expected)
-    with_gap = [x.copy() for x in points]
-    with_gap[2][5:8, 1] = np.nan
-    warped = match.warp(with_gap)
-    known = np.isfinite(warped)
-    assert not known[2, :, 1].all()
-    np.testing.assert_array_equal(warped[known], expected[known])
 
 
 @pytest.mark.parametrize(

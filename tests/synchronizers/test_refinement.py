@@ -12,16 +12,6 @@ from sklearn_motionsync.matching.refinement import SAME_SOURCE, curvature, unexp
 P = 100
 
 
-@pytest.fixture(scope="module")
-def known_warps(benchmark):
-    """Copies of a random movement with gains and known warps, of rates from 0.5 to 2."""
-
-    def make(seed, noise, n_features=16, n=8):
-        return benchmark("accuracy").known_warps(seed, 0.5, 2.0, noise, n=n, n_features=n_features)
-
-    return make
-
-
 def error(X, truth, **params):
     sync = DenseSynchronizer(P, pattern=0, **params).fit(X)
     return np.abs(sync.match(X).times - truth)[1:].mean()

@@ -9,16 +9,6 @@ from sklearn_motionsync.matching.sharpening import Sharpener
 P = 101
 
 
-@pytest.fixture(scope="module")
-def known_warps(benchmark):
-    """Copies of a random movement with known warps, of rates from 0.5 to 2."""
-
-    def make(seed, noise, n_features):
-        return benchmark("accuracy").known_warps(seed, 0.5, 2.0, noise, n_features=n_features)
-
-    return make
-
-
 def warps(X, n_frames=P, **params):
     """Warps with sharpening, and without."""
     sync = DenseSynchronizer(n_frames, refine=False, **params)

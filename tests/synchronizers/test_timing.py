@@ -6,7 +6,6 @@ import pytest
 from sklearn import config_context
 from sklearn.decomposition import PCA
 from sklearn.exceptions import NotFittedError
-from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionDetector,
@@ -46,26 +45,29 @@ def steps(bunch, *last):
     return make_pipeline(DirectionCosines(bunch.skeleton), ASpace(3), *last)
 
 
+@pytest.mark.parametrize("errors", [False, True])
 @pytest.mark.parametrize(
-    ("params", "expected"),
+    ("params", "clock"),
     [
-        ({}, lambda match, _: match.offsets_in("percent")),
-        ({"unit": "frames"}, lambda match, _: match.offsets),
-        (
-            {"unit": "seconds", "frame_rate": 50},
-            lambda match, X: match.offsets_in("seconds", X, 50),
-        ),
+        ({}, ("percent",)),
+        ({"unit": "frames"}, ("frames",)),
+        ({"unit": "seconds", "frame_rate": 50}, ("seconds", 50)),
     ],
 )
-def test_the_channel_is_the_last_feature(points, params, expected):
+def test_offset_and_its_error_are_the_last_features(points, params, clock, errors):
     synchronizer = DenseSynchronizer(30).fit(points)
-    channel = TimingChannel(DenseSynchronizer(30), **params).fit(points)
+    channel = TimingChannel(DenseSynchronizer(30), errors=errors, **params).fit(points)
     out, match = channel.transform(points), synchronizer.match(points)
     np.testing.assert_array_equal(out[:, :, :3], synchronizer.transform(points))
-    np.testing.assert_array_equal(out[:, :, 3], expected(match, points))
-    assert channel.get_feature_names_out()[-1] == "offset"
-    single = TimingChannel(DenseSynchronizer(30), **params)
-    assert single.fit_transform([x.astype(np.float32) for x in points]).dtype == np.float32
+    expected = match.offsets_in(clock[0], points, *clock[1:])
+    np.testing.assert_array_equal(out[:, :, 3], expected)
+    names = ["x0", "x1", "x2", "offset", *["offset_error"] * errors]
+    assert channel.get_feature_names_out().tolist() == names
+    if errors:
+        lower, upper = match.interval(0.6827, clock[0], points, *clock[1:])
+        np.testing.assert_allclose(out[:, :, 4], (upper - lower) / 2)
+    single = channel.fit_transform([x.astype(np.float32) for x in points])
+    assert (single.dtype, single.shape) == (np.float32, (7, 30, len(names)))
 
 
 def test_match_is_that_of_the_synchronizer(points):
@@ -80,20 +82,19 @@ def test_match_is_that_of_the_synchronizer(points):
             getattr(TimingChannel(DenseSynchronizer()), method)(points)
 
 
-def test_rows_give_curves_followed_by_the_channel(points):
+def test_rows_give_curves_followed_by_offsets_and_errors():
     rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
-    channel = TimingChannel(DenseSynchronizer(20)).set_output(transform="pandas").fit(rows)
-    out, inner = channel.transform(rows), channel.synchronizer_
-    assert out.shape == (5, 40)
-    assert list(out.columns[[0, 19, 20, 39]]) == [
-        "densesynchronizer0",
-        "densesynchronizer19",
-        "offset0",
-        "offset19",
-    ]
+    channel = TimingChannel(DenseSynchronizer(20), errors=True).set_output(transform="pandas")
+    out, inner = channel.fit_transform(rows), channel.synchronizer_
+    names = ("densesynchronizer", "offset", "offset_error")
+    assert list(out.columns) == [f"{name}{k}" for name in names for k in range(20)]
     np.testing.assert_array_equal(out.iloc[:, :20], inner.transform(rows))
-    np.testing.assert_array_equal(out.iloc[:, 20:], inner.match(rows).offsets_in("percent"))
-    assert make_pipeline(channel, PCA(2)).fit_transform(rows).shape == (5, 2)
+    np.testing.assert_array_equal(out.iloc[:, 20:40], inner.match(rows).offsets_in("percent"))
+    lower, upper = channel.match(rows).interval(0.6827, "percent")
+    np.testing.assert_allclose(out.iloc[:, 40:], (upper - lower) / 2)
+    plain = TimingChannel(DenseSynchronizer(20)).fit(rows)
+    np.testing.assert_array_equal(plain.transform(rows), out.iloc[:, :40])
+    assert make_pipeline(plain, PCA(2)).fit_transform(rows).shape == (5, 2)
 
 
 def test_keyframes_are_routed_by_name_and_by_request(bunch):
@@ -126,7 +127,7 @@ def test_keyframes_are_routed_by_name_and_by_request(bunch):
             TimingChannel(asking).fit_transform(X, moments=[1])
 
 
-def test_scorers_displays_and_searches_find_the_synchronizer(bunch):
+def test_scorers_and_displays_find_the_synchronizer(bunch):
     pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
     plain = steps(bunch, DenseSynchronizer(30), ActionModel()).fit(bunch.data)
     X = bunch.data
@@ -140,13 +141,8 @@ def test_scorers_displays_and_searches_find_the_synchronizer(bunch):
     one, other = (TrellisDisplay.from_estimator(p, X, trial=1) for p in (pipe, plain))
     np.testing.assert_array_equal(one.space.costs, other.space.costs)
     assert len(SkeletonDisplay.from_model(pipe, frames=[5]).axes_) == 2
-    assert len(SkeletonDisplay.from_departures(pipe, X, trial=1, frames=2).axes_) == 2
     detector = ActionDetector(pipe).fit(X)
     assert (detector.predict(X) == 1).all()
-    search = GridSearchCV(
-        pipe, {"timingchannel__synchronizer__max_offset": [0.0, 0.25]}, cv=2, scoring=SpreadScorer()
-    )
-    assert search.fit(X).best_params_ == {"timingchannel__synchronizer__max_offset": 0.25}
 
 
 def test_model_displays_show_the_channel_beside_poses(bunch):
@@ -202,42 +198,6 @@ def test_fit_refuses_a_feature_with_the_name_of_the_channel(points):
 # -- standard errors of the offset -----------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("params", "clock"),
-    [
-        ({}, ("percent",)),
-        ({"unit": "frames"}, ("frames",)),
-        ({"unit": "seconds", "frame_rate": 50}, ("seconds", 50)),
-    ],
-)
-def test_errors_follow_the_channel_in_its_unit(points, params, clock):
-    plain = TimingChannel(DenseSynchronizer(30), **params).fit(points)
-    channel = TimingChannel(DenseSynchronizer(30), errors=True, **params).fit(points)
-    out = channel.transform(points)
-    np.testing.assert_array_equal(out[:, :, :4], plain.transform(points))
-    bounds = channel.match(points).interval(0.6827, clock[0], points, *clock[1:])
-    np.testing.assert_allclose(out[:, :, 4], (bounds[1] - bounds[0]) / 2)
-    assert channel.get_feature_names_out().tolist() == ["x0", "x1", "x2", "offset", "offset_error"]
-    single = TimingChannel(DenseSynchronizer(30), errors=True, **params)
-    out = single.fit_transform([x.astype(np.float32) for x in points])
-    assert (out.dtype, out.shape) == (np.float32, (7, 30, 5))
-
-
-def test_errors_of_rows_follow_their_channel():
-    rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
-    channel = TimingChannel(DenseSynchronizer(20), errors=True).set_output(transform="pandas")
-    out = channel.fit_transform(rows)
-    assert out.shape == (5, 60)
-    assert list(out.columns[[20, 39, 40, 59]]) == [
-        "offset0",
-        "offset19",
-        "offset_error0",
-        "offset_error19",
-    ]
-    lower, upper = channel.match(rows).interval(0.6827, "percent")
-    np.testing.assert_allclose(out.iloc[:, 40:], (upper - lower) / 2)
-
-
 def test_errors_are_zero_where_a_warp_is_pinned(points):
     lows = np.array([[x[:, 0].argmax()] for x in points])
     channel = TimingChannel(DenseSynchronizer(30, pattern=2), errors=True)
@@ -267,42 +227,3 @@ def test_errors_of_parts_are_those_of_the_whole_body(points):
     parts = PartSynchronizer({"first": [0]}, synchronizer=body)
     found = TimingChannel(parts, errors=True).fit_transform(points)
     np.testing.assert_array_equal(found, expected)
-
-
-def group_of_trials(seed):
-    """A pattern, 12 trials later than it, a third of them under much noise, and true offsets.
-
-    Trials are 5 % late in the middle.
-    """
-    rng, dense = np.random.default_rng(seed), np.linspace(0, 1, 2001)
-
-    def curves(moment):
-        bump = np.exp(-(((moment - 0.6) / 0.12) ** 2))
-        return np.stack([np.cos(2 * np.pi * moment), bump, np.sin(3 * np.pi * moment)], axis=-1)
-
-    def moment(t, late):
-        return t - late * np.sin(np.pi * t) ** 2
-
-    clock, trials = np.linspace(0, 1, 101), []
-    for noise in np.repeat([0.02, 0.05, 0.4], 4):
-        x = curves(moment(np.linspace(0, 1, rng.integers(90, 120)), 0.05))
-        trials.append(x + noise * rng.standard_normal(x.shape))
-    return curves(clock), trials, 100 * (np.interp(clock, moment(dense, 0.05), dense) - clock)
-
-
-def mean_errors(seed):
-    """How far the plain and the weighted mean offset of a group are from the truth, in per cent."""
-    pattern, trials, truth = group_of_trials(seed)
-    channel = TimingChannel(DenseSynchronizer(101, pattern=pattern), errors=True)
-    offsets, errors = np.moveaxis(channel.fit_transform(trials)[:, :, -2:], 2, 0)
-    weights = 1 / (errors**2 + 0.1**2)
-    means = [offsets.mean(axis=0), np.average(offsets, axis=0, weights=weights)]
-    return np.sqrt([np.square(mean - truth).mean() for mean in means])
-
-
-@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
-def test_weighted_means_are_closer_to_the_truth_if_trials_differ_in_noise():
-    """Trials of the same timing: the error of the mean is due to noise alone."""
-    plain, weighted = np.transpose([mean_errors(seed) for seed in range(3)])
-    assert (weighted < plain).all()
-    assert weighted.mean() < 0.5 * plain.mean()
