@@ -1,7 +1,5 @@
 """The comparison of two versions: its jobs, the process that runs them, and what it prints."""
 
-import ast
-import json
 from pathlib import Path
 
 import numpy as np
@@ -36,30 +34,12 @@ class Made:
         return {} if self.name in self.times else {"error": f"KeyError: {self.name}"}
 
 
-def test_every_job_has_a_name_of_its_own():
-    (jobs,) = (
-        node.value
-        for node in ast.parse(JOBS.read_text()).body
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "JOBS"
-    )
-    names = [ast.literal_eval(key) for key in jobs.keys]
-    assert len(set(names)) == len(names) == 76
-
-
 def test_a_process_lists_prepares_and_runs_jobs(worker):
     assert "fit_hops33" in worker.jobs
     assert worker.ask("prepare clone_params") == {}
     assert 0 < worker.ask("run")["ms"] < 1000
     assert worker.ask("prepare nothing") == {"error": "KeyError: 'nothing'"}
     assert "is no request" in worker.ask("stop")["error"]
-
-
-def test_a_package_from_elsewhere_is_refused(compare, tmp_path):
-    jobs = tmp_path / "jobs.py"
-    listed = {"jobs": [], "package": str(ROOT / "sklearn_motionsync" / "__init__.py")}
-    jobs.write_text(f"input()\nprint({json.dumps(listed)!r}, flush=True)")
-    with pytest.raises(SystemExit, match="has imported"):
-        compare.Worker(tmp_path, jobs, tmp_path)
 
 
 def test_ratios_are_those_of_minima_and_of_rounds(compare):

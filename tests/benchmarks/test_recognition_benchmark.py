@@ -58,18 +58,6 @@ def test_published_splits_are_disjoint(recognition, tmp_path):
     assert (train.tolist(), test.tolist()) == ([1, 2], [0, 3, 4])
 
 
-def test_published_splits_match_the_archive(recognition, real_data):
-    archive = np.load(real_data / "utkinect" / "utkinect_positions.npz")
-    actors = archive["actor"]
-    path = real_data / "utkinect" / "utkinect_splits.json"
-    splits = recognition.published_splits(path, actors)
-    assert len(splits) == 10
-    for train, test in splits:
-        assert not set(actors[train]) & set(actors[test])
-        assert sorted([*train, *test]) == list(range(199))
-        assert len(set(actors[train])) == len(set(actors[test])) == 5
-
-
 def test_leave_one_actor_out_splits(recognition):
     actors = np.array(["b", "a", "b", "c"])
     left_out = [
@@ -103,12 +91,6 @@ def test_fourier_amplitudes_of_sine_waves(recognition):
     found = recognition.fourier_pyramid(X, n_levels=2, n_frequencies=5)[0]
     # Four waves in the whole are two in either half.
     np.testing.assert_allclose(found, [3, 0, 0, 0, 1] + 2 * [3, 0, 1, 0, 0], atol=1e-12)
-
-
-def test_kernels_use_the_training_set_only(recognition):
-    D = np.array([[0.0, 2, 4, 9], [2, 0, 6, 9], [4, 6, 0, 9], [9, 9, 9, 0]])
-    K = recognition.kernel_of(2 * D, np.arange(3))
-    np.testing.assert_allclose(K, np.exp(-D / 4))
 
 
 def test_benchmarked_pipeline_is_that_of_the_manual(recognition, bunch, recordings):

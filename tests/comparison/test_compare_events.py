@@ -48,17 +48,6 @@ def test_means_spreads_sizes_and_p_values_are_those_of_people(capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_the_level_holds_over_all_events():
-    """By chance 1 of 10 studies; more than 4 come in one of 600 series."""
-    rng, wrong = np.random.default_rng(0), 0
-    X = [np.zeros((101, 1)) for _ in range(12)]
-    for seed in range(10):
-        events = np.sort(rng.uniform(1, 99, (12, 4)))
-        given = {"level": 0.1, "n_permutations": 99, "random_state": seed}
-        wrong += compare_events(X, events, ["a", "b"] * 6, **given)["differs"].any()
-    assert wrong <= 4
-
-
 def test_a_table_in_seconds_without_groups():
     names = pd.MultiIndex.from_arrays([GAIT.person, GAIT.cycle], names=["subject", "trial"])
     trials = to_trials(to_frame(GAIT.data, trials=names))

@@ -13,7 +13,6 @@ from sklearn_motionsync.matching.matcher import cost_features
 from oracle import FEATURES, STEP_WEIGHTS, slow_filter
 
 METHOD = Path(__file__).parents[2] / "docs" / "method.md"
-DIRECT = {"cost": "pose", "smoothness": 0, "consensus": 0, "max_offset": 1}
 
 
 @pytest.mark.parametrize("cost", COSTS)
@@ -61,15 +60,6 @@ def test_step_table_refuses_unknown_cost():
         step_table("dtw")
 
 
-@pytest.mark.parametrize(("max_rate", "fastest"), [(1, 1), (1.9, 1), (2, 2), (3.5, 3)])
-def test_late_movement_runs_at_the_largest_rate(max_rate, fastest):
-    x = np.zeros((2, 41, 1))
-    x[0, 8:], x[1, 28:] = 1, 1
-    x[:, 33:] = np.arange(2, 10)[:, np.newaxis]
-    sync = DenseSynchronizer(pattern=0, max_rate=max_rate, **DIRECT).fit(x)
-    assert np.diff(sync.match(x[1:]).times).max() == fastest
-
-
 @pytest.mark.parametrize(
     ("max_rate", "subframes"), [(1, 1), (1.9, 1), (1.4, 2), (1.5, 2), (2.9, 3), (3.5, 4)]
 )
@@ -99,14 +89,3 @@ def test_velocities_ignore_offsets_and_rest(cost):
         lower, upper = (cost_features(z, cost, smoothing=smoothing) for z in (x, x + [30, -8]))
         np.testing.assert_allclose(upper, lower, atol=1e-10)
     assert not cost_features(np.ones((2, 30, 3)), cost).any()
-
-
-@pytest.mark.parametrize("pace", [1, 4])
-def test_velocities_are_by_the_frame(pace):
-    p = np.arange(0, 20 + 1e-9, 1 / pace)[np.newaxis, :, np.newaxis]
-    slope = np.array([3.0, -4.0])
-    found = cost_features(p * slope, "velocity", smoothing=0.1, pace=pace)
-    np.testing.assert_allclose(found[0], np.tile(slope, (p.size, 1)), rtol=1e-3)
-    # The length of the elastic feature is the root of the speed.
-    found = cost_features(p * slope, "elastic", smoothing=0.1, pace=pace)
-    np.testing.assert_allclose(found[0], np.tile(slope / 5**0.5, (p.size, 1)), rtol=1e-3)

@@ -103,29 +103,6 @@ def test_ties_take_the_same_step_in_every_way_of_back_tracking(monkeypatch):
     np.testing.assert_array_equal(found[0], found[2])
 
 
-def test_weights_of_one_are_as_without_weights():
-    bases, moving = draw(0, 9, 1, exact=False)
-    bases[..., 2], moving[..., 2] = 1, 1
-    table = step_table("velocity", 3, 1)
-    plain, weighed = Trellis(table, 0.3, 4), Trellis(table, 0.3, 4, unseen=0.7)
-    expected = plain.distances(bases[..., :2], moving[..., :2])
-    np.testing.assert_allclose(weighed.distances(bases, moving), expected, rtol=1e-12)
-    paths = plain.paths(bases[..., :2].copy(), moving[..., :2].copy())
-    np.testing.assert_array_equal(weighed.paths(bases, moving), paths)
-
-
-def test_what_was_not_seen_does_not_matter():
-    bases, moving = draw(1, 9, 1, exact=False)
-    trellis = Trellis(step_table("velocity", 3, 1), 0.3, 4, unseen=0.7)
-    expected = trellis.paths(bases, moving), trellis.distances(bases, moving)
-    for sequences in (bases, moving):
-        hidden = sequences[..., 2] == 0
-        assert hidden.any()
-        sequences[hidden, :2] = np.random.default_rng(2).standard_normal((hidden.sum(), 2))
-    np.testing.assert_array_equal(trellis.paths(bases, moving), expected[0])
-    np.testing.assert_allclose(trellis.distances(bases, moving), expected[1], rtol=1e-12)
-
-
 def test_gaps_and_keyframes_together_equal_all_admissible_paths():
     bases, moving = draw(5, 6, 1, exact=False)
     keyframes = np.array([[0.4], [0.2], [np.nan]]), np.array([[0.6], [np.nan], [0.2], [0.8]])
@@ -168,39 +145,6 @@ def curves(n=6, n_frames=80, seed=0):
         b = np.cos(2 * np.pi * (2.5 * t + 0.1 * rng.random()))
         out.append(np.column_stack([a, b, a + b, a - 2 * b, 3 * b + 0.5]))
     return out
-
-
-def test_a_feature_that_the_others_determine_is_recovered():
-    X = curves()
-    filler = Filler.learn(X)
-    gappy = X[2].copy()
-    gappy[20:60, 3] = np.nan
-    filled, weights = filler(gappy)
-    line = np.interp(np.arange(20, 60), [19, 60], X[2][[19, 60], 3])
-    wrong = np.abs(line - X[2][20:60, 3]).max()
-    # All but what the ridge shrinks.
-    assert np.abs(filled[20:60, 3] - X[2][20:60, 3]).max() < wrong / 3
-    seen = np.isfinite(gappy)
-    np.testing.assert_array_equal(filled[seen], gappy[seen])
-    assert (weights[:20] == 1).all()
-    assert (weights[60:] == 1).all()
-    # Of what is known the rest is small.
-    assert weights[20:60].min() > 0.9
-
-
-def test_weights_fall_with_the_length_of_a_gap():
-    X, found = curves(), []
-    filler = Filler.learn(X)
-    for length in (4, 8, 16, 40):
-        gone = X[1].copy()
-        gone[20 : 20 + length] = np.nan
-        filled, weights = filler(gone)
-        assert np.isfinite(filled).all()
-        found.append(weights[20 : 20 + length].min())
-        assert (weights[:20] == 1).all()
-    assert found == sorted(found, reverse=True)
-    assert found[0] > 0.9
-    assert found[-1] < 0.2
 
 
 def correlations(n_frames, value_time, velocity_time):

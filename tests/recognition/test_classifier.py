@@ -1,21 +1,18 @@
 """The classifier: against its kernel written out, of few trials, of unknown actions."""
 
 import json
-import pickle
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.special import softmax
 from sklearn import config_context
-from sklearn.ensemble import StackingClassifier
 from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import log_loss, roc_auc_score
 from sklearn.model_selection import (
     GridSearchCV,
     GroupKFold,
-    cross_val_score,
     cross_validate,
 )
 from sklearn.pipeline import make_pipeline
@@ -196,8 +193,6 @@ def test_decisions_do_not_depend_on_other_trials_or_jobs(known, fitted, new):
     two = ActionClassifier(n_frames=30, n_jobs=2).fit(X, y, groups=people)
     np.testing.assert_array_equal(two.decision_function(new[0]), decisions)
     assert two.temperature_ == fitted.temperature_
-    again = pickle.loads(pickle.dumps(fitted))
-    np.testing.assert_array_equal(again.decision_function(new[0]), decisions)
 
 
 @pytest.mark.parametrize("scale", [2.0**-26, 2.0**25])
@@ -446,13 +441,8 @@ def bends():
     return X, np.repeat(["bend", "half"], 12), np.tile(bunch.actor, 2), pipe
 
 
-def test_classifier_in_cross_validation_searches_and_ensembles(bends):
+def test_groups_are_routed_in_cross_validation_and_searches(bends):
     X, y, people, pipe = bends
-    assert cross_val_score(pipe, X, y, groups=people, cv=GroupKFold(2)).mean() > 0.9
-    world = DirectionCosines(pipe[0].skeleton, "world")
-    quick = make_pipeline(world, ActionClassifier("pose", n_frames=8))
-    stack = StackingClassifier([("a", quick), ("b", quick)], LogisticRegression(), cv=2)
-    assert stack.fit(X, y).score(X, y) > 0.9
     reached = pipe.fit(X, y, actionclassifier__groups=people)[-1].temperature_
     with config_context(enable_metadata_routing=True):
         routed = make_pipeline(pipe[0], ActionClassifier(n_frames=15).set_fit_request(groups=True))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sklearn.model_selection import LeaveOneGroupOut
+from sklearn.model_selection import GroupKFold
 from sklearn_motionsync.takes import CycleSegmenter
 
 
@@ -59,7 +59,7 @@ def test_walks_of_too_few_cycles_are_rejected(n_cycles, read):
 def phases_of_others(bunch):
     """Phases of every take, by a segmenter that knows the takes of other people only."""
     out = [None] * len(bunch.data)
-    for train, test in LeaveOneGroupOut().split(bunch.data, groups=bunch.actor):
+    for train, test in GroupKFold(2).split(bunch.data, groups=bunch.actor):
         # Which foot is farther ahead depends on who is left out.
         segmenter = CycleSegmenter(bunch.skeleton, start="right")
         segmenter.fit([bunch.data[i] for i in train])
@@ -82,7 +82,7 @@ def mean_deviation(phases, strikes):
 
 
 def test_matched_phases_of_foot_strikes_vary_less_than_at_constant_periods(cycles, read):
-    """On jogging; the pattern is that of the other three actors."""
+    """On jogging; the pattern is that of two other actors."""
     bunch = read("hdm05", cycles.CYCLIC["hdm05"])
     strikes = [
         cycles.foot_strikes(x, bunch.skeleton, rate)
