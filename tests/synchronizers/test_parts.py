@@ -104,14 +104,10 @@ def test_warps_of_parts_come_nearer_with_the_coupling(grabs):
     assert np.max(apart[-2]) < 1e-6
 
 
-def test_lags_are_measured_without_coupling(poses):
+def test_lags_are_measured_without_coupling(fitted, poses):
     """An arm that is 5 % late is found as late, while its warp is drawn to the body."""
-    sync = {c: of_parts(coupling=c, n_frames=60).fit(poses) for c in (0, 0.1)}
-    late = [x.copy() for x in poses]
-    for x in late:
-        frames = np.arange(len(x))
-        for k in sync[0].parts_["right arm"]:
-            x[:, k] = np.interp(frames - 0.05 * frames[-1], frames, x[:, k])
+    sync = {0: fitted, 0.1: of_parts(coupling=0.1, n_frames=60).fit(poses)}
+    late = [shifted(x, fitted.parts_["right arm"], 0.05) for x in poses]
     inner, found, warped = slice(6, -12), {}, {}
     for coupling, own in sync.items():
         values = [own.lags(X, unit="percent") for X in (poses, late)]
@@ -139,10 +135,9 @@ def test_strong_coupling_follows_warps_steeper_than_a_path(real_data):
 # -- warps of parts ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("settings", [{}, {"consensus": 0}])
-def test_match_is_that_of_the_dense_synchronizer(poses, settings):
-    sync = of_parts(n_frames=40, **settings).fit(poses)
-    dense = DenseSynchronizer(40, **settings).fit(poses)
+def test_match_is_that_of_the_dense_synchronizer(poses):
+    sync = of_parts(n_frames=40, consensus=0).fit(poses)
+    dense = DenseSynchronizer(40, consensus=0).fit(poses)
     for own, other in zip(sync.match(poses), dense.match(poses), strict=True):
         np.testing.assert_array_equal(own, other)
     assert sync.match_parts(poses).keys() == dict.fromkeys(PARTS).keys()
@@ -217,13 +212,17 @@ def test_uncoupled_parts_are_independent(fitted, poses):
     assert np.abs(before["trunk"].times - after["trunk"].times).max() > 1
 
 
-def test_parts_that_do_not_move_follow_the_body(poses):
+def test_part_that_does_not_move_follows_the_body_and_is_no_reference(poses):
     X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in poses]
-    sync = of_parts({"still": [37], "arm": [25, 26, 27]}, 0, n_frames=40).fit(X)
-    match = sync.match_parts(X)["still"]
+    arms = {"left": [22, 23, 24], "right": [25, 26, 27]}
+    sync = of_parts({**arms, "still": [37]}, 0, n_frames=40).fit(X)
+    match, lags = sync.match_parts(X)["still"], sync.lags(X)
     np.testing.assert_array_equal(match.times, sync.match(X).times)
     assert np.isnan(match.distances).all()
     assert np.isfinite(sync.transform(X)).all()
+    assert (lags.values[:, 2] == 0).all()
+    without = of_parts({**arms}, 0, n_frames=40).fit(X)
+    np.testing.assert_allclose(lags.values[:, :2], without.lags(X).values, atol=1e-9)
 
 
 def test_unit_and_jobs_do_not_change_a_part(fitted, poses):
@@ -367,16 +366,6 @@ def test_delay_that_all_parts_share_is_no_lag(fitted, poses):
     own = fitted.match(late).offsets - fitted.match(poses).offsets
     assert np.median(own[:, 10:50]) * 100 / 59 > 4
     assert np.median(np.abs(change[:, :, 10:50])) < 1
-
-
-def test_part_that_does_not_move_has_no_lag_and_is_no_reference(poses):
-    X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in poses]
-    arms = {"left": [22, 23, 24], "right": [25, 26, 27]}
-    sync = of_parts({**arms, "still": [37]}, 0, n_frames=40).fit(X)
-    without = of_parts({**arms}, 0, n_frames=40).fit(X)
-    lags = sync.lags(X)
-    assert (lags.values[:, 2] == 0).all()
-    np.testing.assert_allclose(lags.values[:, :2], without.lags(X).values, atol=1e-9)
 
 
 def test_spread_within_and_between_subjects_agrees_with_scipy():
