@@ -273,9 +273,9 @@ def test_example_in_a_notebook_on_the_embedded_data(monkeypatch, capsys, tmp_pat
 def test_example_on_real_people(monkeypatch, capsys, tmp_path, real_data):
     path = real_data / "hdm05" / "hdm05_positions.npz"
     out = run_example(
-        monkeypatch, capsys, "--data", path, "--action", "depositFloorR", "--output", tmp_path
+        monkeypatch, capsys, "--data", path, "--action", "sneak2StepsLStart", "--output", tmp_path
     )
-    assert "24 of depositFloorR" in out
+    assert "13 of sneak2StepsLStart" in out
     assert_figures(tmp_path)
 
 

@@ -418,44 +418,6 @@ def test_a_difference_in_timing_is_called_timing(late):
     assert found.n_units == 16
 
 
-def test_a_difference_in_shape_is_called_shape_in_its_unit():
-    gait, pipe = studied(24, amplitude=18)
-    found = compare_groups(
-        pipe, gait.data, gait.group, groups=gait.person, signals=gait.data, n_permutations=199
-    )
-    answers = found.to_frame()["differs"]
-    assert answers[["joint", "shape"]].all()
-    assert not answers["timing"]
-    assert set(found.clusters["what"]) == {"shape"}
-    largest = found.clusters.loc[found.clusters["size"].abs().idxmax()]
-    assert 4 < abs(largest["size"]) < 25  # degrees, not standard deviations
-    assert largest.lower < largest["size"] < largest.upper
-
-
-def test_a_bump_in_one_of_four_signals_is_not_called_timing():
-    """The warps follow the bump; without that signal the groups do not differ in timing."""
-    gait = make_gait(20, 2, random_state=4)
-    trials = []
-    for x, group in zip(gait.data, gait.group, strict=True):
-        t = np.linspace(0, 1, len(x))
-        bump = 20 * np.exp(-(((t - 0.2) / 0.06) ** 2) / 2) * (group == "B")
-        trials.append(x + bump[:, np.newaxis] * [0, 1, 0, 0])
-    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(trials)
-    given = {"y": gait.group, "groups": gait.person, "n_permutations": 199}
-    found = compare_groups(pipe, trials, **given)
-    assert found.p_timing < 0.05  # the offsets do differ
-    assert set(found.clusters["what"]) == {"shape"}
-    assert set(found.clusters["feature"]) == {"x1"}
-    # Of the knee alone it stays open, and the warps take what they can.
-    knee = [x[:, [1]] for x in trials]
-    alone = compare_groups(DenseSynchronizer(P).fit(knee), knee, **given)
-    assert "timing" in set(alone.clusters["what"])
-    # Where shapes are not looked at, neither is found, and the answer says so.
-    hip = compare_groups(pipe, trials, **given, features=0)
-    assert "A and B, 20 people: they differ, in shape or in timing (joint" in hip.describe()
-    assert len(hip.clusters) == 0
-
-
 def test_a_constant_signal_leaves_timing_what_it_is(late):
     gait, _ = late
     knee = [np.column_stack([x[:, 1], np.ones(len(x))]) for x in gait.data]

@@ -47,16 +47,6 @@ def test_late_patients_are_late_and_keep_their_shape(late):
     assert "later, at" in found.describe(row["subject"])
 
 
-def test_weak_patients_are_weak():
-    found = compared(*studied(amplitude=-25), level=0.1, features=[0, 1])
-    shape = found.departures[found.departures["what"] == "shape"]
-    assert found.verdicts["p_shape"].median() < 0.05
-    assert set(shape["feature"]) == {"x1"}
-    assert set(shape["direction"]) == {"below"}
-    assert shape["peak"].between(60, 85).all()
-    assert shape["size"].between(-40, -12).all()  # degrees
-
-
 def test_as_many_people_of_the_norm_differ_as_the_level_says():
     """By chance 10 of 100; more than 20 come in one of 2,000 series."""
     rng, wrong = np.random.default_rng(0), []

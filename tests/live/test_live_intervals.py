@@ -8,9 +8,7 @@ from scipy.special import softmax
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.live import OnlineSynchronizer
-from sklearn_motionsync.live.stream import Streams, gains_of, phase_bounds
-from sklearn_motionsync.live.synchronizer import Reference, calibrate
-from sklearn_motionsync.utils.parallel import Progress
+from sklearn_motionsync.live.stream import gains_of, phase_bounds
 
 P = 100
 BUNCH = make_bending(48, n_actors=8, n_frames=P, random_state=4)
@@ -203,47 +201,6 @@ def test_bounds_are_quantiles_about_the_phase():
     # Costs of any size, and copies without costs.
     huge = phase_bounds(gains_of(1e60 * costs), np.full(20, 1e-9), phase, 99)
     assert np.isfinite(huge).all()
-
-
-def references_of(live):
-    """A function that makes the reference of a mean, as a fitted synchronizer does."""
-
-    def reference_of(mean, *calibration):
-        return Reference(live.synchronizer_.features_, mean, live.duration_, *calibration)
-
-    return reference_of
-
-
-def test_bounds_of_streams_equal_their_definition(fitted, clips):
-    """By excess of the cost and the share of the features, of which one limb is hidden at times."""
-    X, reference_of = COSINES.transform([BUNCH.data[i] for i in KNOWN]), references_of(fitted)
-    match = fitted.synchronizer_.match(X)
-    given = X, match.warp(X), match.times, Progress(None, verbose=0)
-    reference = reference_of(fitted.mean_, *calibrate(reference_of, *given))
-    streams = Streams(reference, 2, clips[0].shape[1])
-    x, y = clips[0][:60], np.roll(clips[1], 7, axis=1)[:60].copy()
-    x[20:40, 10:16] = np.nan
-    share, n_features = np.ones(2), x.shape[1]
-    for k, sample in enumerate(np.stack([x, y], axis=1)):
-        streams.update(sample)
-        found, n = streams.estimate(0.0), k + 1
-        # Velocities are unknown as long as their features.
-        seen = 1 - np.array([6 * (20 <= k < 40), 0]) / n_features
-        if k == 40:
-            seen[0] = 1 - 6 / n_features
-        share += (seen - share) / min(n, 10)
-        excess = np.maximum(streams.mean_cost / reference.typical_cost, 1)
-        temperature = reference.interval_temperature * excess / share**2
-        temperature *= np.maximum(excess / 4, 1) ** 2
-        gains = gains_of(streams.trellis.costs)[:, ::2]
-        bounds = phase_bounds(gains, temperature, found.phase, P - 1)
-        np.testing.assert_allclose([found.lower, found.upper], bounds, atol=1e-9)
-    assert streams.mean_cost[1] > 4 * reference.typical_cost
-    # Until the next sample they move with the phase.
-    later = streams.estimate(0.5)
-    for name in ("phase", "lower", "upper"):
-        expected = np.minimum(getattr(found, name) + found.rate / 2, P - 1)
-        np.testing.assert_allclose(getattr(later, name), expected)
 
 
 def test_intervals_do_not_depend_on_the_unit():

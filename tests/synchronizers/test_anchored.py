@@ -109,24 +109,6 @@ def test_soft_keyframes_draw_where_nothing_else_tells():
     np.testing.assert_allclose(met, 0.15 + 0.01 * np.arange(6), atol=0.005)
 
 
-def test_known_moments_right_a_movement_that_misleads():
-    """Two equal strokes: the middle says which one is meant, and nothing else does."""
-    t = np.linspace(0, 1, 101)
-
-    def strokes(first, second):
-        bumps = [np.exp(-0.5 * ((t - at) / 0.03) ** 2) for at in (first, second)]
-        return np.stack([sum(bumps), np.gradient(sum(bumps))], axis=1)
-
-    X = [strokes(0.25 + 0.01 * i, 0.7 - 0.005 * i) for i in range(5)]
-    X.append(np.stack([np.exp(-0.5 * ((t - 0.5) / 0.03) ** 2)] * 2, axis=1))
-    X[-1][:, 1] = np.gradient(X[-1][:, 0])
-    for stroke, at in enumerate((0.25, 0.7)):
-        K = [[100 * (0.25 + 0.01 * i, 0.7 - 0.005 * i)[stroke]] for i in range(5)] + [[50.0]]
-        sync = DenseSynchronizer(101, pattern=0).fit(X, keyframes=K)
-        times = sync.match(X, keyframes=K).times[-1]
-        np.testing.assert_allclose(np.interp(100 * at, np.arange(101), times), 50, atol=1e-9)
-
-
 def test_the_disparity_space_shows_the_anchored_path(bunch):
     K = bunch.keyframes[:, [2]].copy()
     K[8] += 9

@@ -109,16 +109,3 @@ def test_every_action_of_optical_recordings_is_supported(real_data):
         evidence = DenseSynchronizer(P).fit(points).evidence_
         assert evidence.inconsistency < 0.5, action
         assert evidence.remaining < 0.7, action
-
-
-def test_trials_of_other_heights_agree():
-    """Much remains of steps at three speeds, and their warps agree all the same."""
-    rng, t = np.random.default_rng(0), np.linspace(0, 1, P)
-    X = []
-    for i in range(30):
-        phase = t + rng.uniform(-0.04, 0.04) * np.sin(np.pi * t)
-        peaks = np.exp(-np.square((phase[:, np.newaxis] - [0.25, 0.75]) / 0.12)).sum(axis=1)
-        X.append((1, 3, 6)[i % 3] * peaks[:, np.newaxis] + 0.02 * rng.standard_normal((P, 1)))
-    evidence = DenseSynchronizer(P).fit(X).evidence_
-    assert evidence.remaining > 0.7
-    assert evidence.inconsistency < 0.4

@@ -96,17 +96,6 @@ def test_what_was_hidden_stays_nan(name):
             assert np.isfinite(getattr(sync, attribute)).all()
 
 
-def test_frames_of_which_nothing_is_seen_take_their_time_from_their_neighbours():
-    sync = DenseSynchronizer(P).fit(WHOLE)
-    expected = sync.match(WHOLE).times
-    for i, x in enumerate(WHOLE):
-        gone = x.copy()
-        gone[len(x) // 2 : len(x) // 2 + len(x) // 8] = np.nan
-        times = sync.match([gone]).times[0]
-        assert (np.diff(times) >= 0).all()
-        assert np.abs(times - expected[i]).max() < 3
-
-
 def test_a_feature_that_one_trial_never_shows():
     sync = DenseSynchronizer(P)
     X = [x.copy() for x in WHOLE]

@@ -157,17 +157,6 @@ def test_score_is_the_cosine_with_the_pattern(size):
         assert list(locate_cycles(take, phases, pattern, False)) == []
 
 
-def test_incomplete_adds_the_first_and_last_part_cycle():
-    take, _ = slowing_take()
-    segmenter = CycleSegmenter(start=0).fit(take)
-    whole = segmenter.segment(take)[1]
-    locations = segmenter.set_params(incomplete=True).segment(take)[1]
-    pd.testing.assert_frame_equal(locations[locations["complete"]].reset_index(drop=True), whole)
-    assert locations["complete"].tolist() == [False, *[True] * 7, False]
-    assert locations["start"].iloc[0] == 0
-    assert locations["stop"].iloc[-1] == len(take)
-
-
 def body_at_rest(n_frames):
     """The joints (n_frames, 15, 3) of a body that stands and faces along z."""
     place = {"pelvis": (0, 1), "neck": (0, 1.5), "head": (0, 1.7)}
