@@ -136,8 +136,17 @@ def _is_private(name):
     return name.startswith("_") and not name.startswith("__")
 
 
+# Where a private name may be taken: behind a dot, in an import, also of several lines, or by text.
+MAY_BE_PRIVATE = re.compile(
+    r"\._[A-Za-z]|\b(from|import)\b.*[ .]_[A-Za-z]|^\s+_\w+( as \w+)?,?$|\bsetattr\b", re.MULTILINE
+)
+
+
 def private_accesses(path):
     """Names with an underscore that a file takes from other modules and objects."""
+    text = re.sub(r"\b(self|cls|super\(\))\._", "", path.read_text(encoding="utf-8"))
+    if not MAY_BE_PRIVATE.search(text):
+        return
     for node in ast.walk(read(path)):
         taken = []
         if isinstance(node, ast.Attribute) and not _is_own(node.value):
