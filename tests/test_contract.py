@@ -431,21 +431,12 @@ def test_bad_trial_is_refused_by_its_index(estimator, fault, when, trials):
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_other_kinds_of_input_are_refused(estimator):
+def test_other_kinds_widths_and_names_are_refused(estimator, trials):
     for X, message in (([], "0 trials"), ({"a": np.zeros((3, WIDTH))}, "got dict")):
         with pytest.raises(ValueError, match=message):
             clone(estimator).fit(X)
-
-
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_wrong_width_is_refused(estimator, trials):
-    fitted = fit_once(estimator)
     with pytest.raises(ValueError, match=r"Trial 0 has 42 features a frame.*expecting 45"):
-        outputs(fitted, [x[:, 3:] for x in trials])
-
-
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_other_feature_names_are_refused(estimator, trials):
+        outputs(fit_once(estimator), [x[:, 3:] for x in trials])
     frames = KINDS["frames"](trials)
     fitted = clone(estimator).fit(frames)
     with pytest.raises(ValueError, match="feature names should match"):
