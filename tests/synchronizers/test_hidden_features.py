@@ -108,16 +108,12 @@ def test_a_feature_that_one_trial_never_shows():
     assert np.isnan(out).sum() == P
 
 
-def test_arrays_of_three_and_two_dimensions_and_memory_maps(tmp_path):
-    X = np.stack([np.resize(x, (50, x.shape[1])) for x in GAPPY])
-    expected = clone(DENSE).fit(list(X)).transform(list(X))
-    np.save(tmp_path / "X.npy", X)
-    maps = np.load(tmp_path / "X.npy", mmap_mode="r")
-    for given in (X, maps):
-        np.testing.assert_array_equal(clone(DENSE).fit(given).transform(given), expected)
-    rows = X[:, :, 3]
+def test_rows_and_memory_maps(tmp_path):
+    rows = np.stack([np.resize(x[:, 3], 50) for x in GAPPY])
     assert np.isnan(rows).any()
-    out = clone(DENSE).fit(rows).transform(rows)
+    np.save(tmp_path / "X.npy", rows)
+    maps = np.load(tmp_path / "X.npy", mmap_mode="r")
+    out = clone(DENSE).fit(maps).transform(maps)
     alone = clone(DENSE).fit(list(rows[:, :, None])).transform(list(rows[:, :, None]))
     np.testing.assert_array_equal(out, alone[:, :, 0])
 

@@ -94,14 +94,6 @@ def test_metric_of_many_is_learnt_from_twenty(trials):
     np.testing.assert_array_equal(DenseSynchronizer(60).fit(X[:12]).metric_.trials, range(12))
 
 
-def test_single_precision_gives_the_same_metric(trials):
-    X = trials[0]
-    single = DenseSynchronizer(60, pattern=0).fit([x.astype(np.float32) for x in X])
-    double = DenseSynchronizer(60, pattern=0).fit(X)
-    np.testing.assert_allclose(single.metric_.share, double.metric_.share, atol=1e-4)
-    assert np.median(np.abs(single.match(X).times - double.match(X).times)) < 1e-3
-
-
 def test_metric_hardly_depends_on_the_number_of_frames(trials):
     X = trials[0]
     short, long = (DenseSynchronizer(p, max_offset=0.1).fit(X).metric_ for p in (100, 401))
