@@ -9,6 +9,7 @@ os.environ.setdefault("SCIPY_ARRAY_API", "1")
 
 import numpy as np
 import pytest
+from sklearn.utils import Bunch
 from sklearn_motionsync import ASpace, DirectionCosines
 from sklearn_motionsync.datasets import load_trials, make_bending
 
@@ -43,10 +44,21 @@ def known_warps(benchmark):
 
 
 @pytest.fixture(scope="session")
-def bends(real_data):
+def hdm05(real_data):
+    """Joint positions of clips of optical motion capture."""
+    return load_trials(real_data / "hdm05" / "hdm05_positions.npz")
+
+
+@pytest.fixture(scope="session")
+def utkinect(real_data):
+    """Joint positions of clips of a Kinect."""
+    return load_trials(real_data / "utkinect" / "utkinect_positions.npz")
+
+
+@pytest.fixture(scope="session")
+def bends(hdm05):
     """The 24 real bends of four actors: joint positions."""
-    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
-    chosen = np.flatnonzero(bunch.target == "depositFloorR")
+    bunch, chosen = Bunch(**hdm05), np.flatnonzero(hdm05.target == "depositFloorR")
     bunch.data = [bunch.data[i] for i in chosen]
     for name in ("target", "actor", "take", "frame_rate"):
         bunch[name] = bunch[name][chosen]

@@ -19,7 +19,7 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     Match,
 )
-from sklearn_motionsync.datasets import load_trials, make_bending
+from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import (
     ActionModelDisplay,
     MetricDisplay,
@@ -37,9 +37,8 @@ def make_pipe(skeleton, synchronizer=None):
     return make_pipeline(DirectionCosines(skeleton), ASpace(8), synchronizer, ActionModel())
 
 
-def test_people_are_accepted_and_another_action_scores_lower(bends, real_data):
-    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
-    others = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t.startswith("hop")]
+def test_people_are_accepted_and_another_action_scores_lower(bends, hdm05):
+    others = [x for x, t in zip(hdm05.data, hdm05.target, strict=True) if t.startswith("hop")]
     pipe = make_pipe(bends.skeleton).fit(bends.data)
     assert (pipe.predict(bends.data) == 1).mean() > 0.9
     assert pipe.score_samples(others).max() < pipe.score_samples(bends.data).min()

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import find_peaks
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
-from sklearn_motionsync.datasets import load_trials, make_gait
+from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.live import OnlineSynchronizer
 from sklearn_motionsync.live.stream import Course, go_round
 from sklearn_motionsync.takes import CycleSegmenter
@@ -95,10 +95,12 @@ def test_it_begins_anywhere(fitted, begin):
     assert np.abs(errors(found, truth)[LENGTH // 5 :]).max() < 5
 
 
-def test_no_phase_of_a_cycle_depends_on_later_frames(fitted, live, walk):
-    x = walk[0][:300].copy()
-    x[100:110] = x[200, 1] = np.nan
-    whole, *parts = fitted.track([x, x[:41], x[:163]])
+@pytest.mark.parametrize("cyclic", [True, False])
+def test_track_equals_step_and_no_phase_depends_on_later_frames(cyclic, fitted, walk, single):
+    known = fitted if cyclic else single[0]
+    x = walk[0][:300].copy() if cyclic else np.tile(single[1], (3, 1))
+    x[100:110] = x[0, 1] = x[30, 1] = np.nan
+    live, (whole, *parts) = copy.deepcopy(known), known.track([x, x[:41], x[:163]])
     steps = [live.step(frame) for frame in x]
     for name in NAMES:
         values = getattr(whole, name)
@@ -107,6 +109,7 @@ def test_no_phase_of_a_cycle_depends_on_later_frames(fitted, live, walk):
             np.testing.assert_array_equal(values[:n], getattr(part, name))
         np.testing.assert_array_equal(values, [getattr(step, name) for step in steps])
         np.testing.assert_array_equal(values, getattr(live.history, name))
+    assert all(isinstance(value, float) for value in steps[0][:5])
     assert isinstance(steps[0].cycle, int)
     assert whole.cycle.dtype.kind == "i"
 
@@ -143,15 +146,6 @@ def test_cycles_go_on_while_nothing_is_seen(fitted, walk):
     assert (hidden.upper - hidden.lower)[340] > 2.5 * (hidden.upper - hidden.lower)[190]
 
 
-def test_another_pace_is_followed(fitted):
-    for pace in (0.6, 1.6):
-        truth = paced(900, 0.1, 0.0, pace)
-        (found,) = fitted.track([pose(truth)])
-        # The delay of the filters is that of the mean pace.
-        assert np.median(np.abs(errors(found, truth)[200:])) < 4
-        assert np.median(found.rate[200:]) == pytest.approx(pace, rel=0.1)
-
-
 def test_confidence_is_low_for_standing_still_and_other_movements(fitted, walk):
     x = walk[0]
     still, backwards = np.repeat(x[100:101], 400, axis=0), x[::-1]
@@ -171,14 +165,6 @@ def test_standing_still_within_a_walk_is_no_cycle(fitted):
     assert found.confidence[500] < 0.5 < found.confidence[-50:].min()
 
 
-def test_a_cycle_that_trembles_at_its_beginning_begins_once(fitted):
-    t = np.arange(120)
-    ahead = np.r_[np.linspace(0.3, 1.0, 45), 1 + 0.02 * np.sin(t / 4), np.linspace(1, 1.7, 45)]
-    (found,) = fitted.track([pose(ahead)])
-    assert np.diff(found.cycle).tolist().count(1) == 1
-    assert np.diff(found.cycle).min() == 0
-
-
 def test_phases_go_on_by_the_shorter_way():
     """Small steps back over the beginning stay there; large ones are taken back."""
     phase, cycle, told = np.array([0.0]), np.array([0]), []
@@ -194,15 +180,17 @@ def test_phases_go_on_by_the_shorter_way():
 
 def test_time_left_of_a_cycle_is_at_the_pace_of_the_last_one(fitted, live):
     truth = paced(600, 0.4, 0.0, 0.75)
-    left = []
+    left, rates = [], []
     assert live.time_left() == live.duration_
     for frame in pose(truth):
         now = live.step(frame)
         left.append(live.time_left())
+        rates.append(now.rate)
     true = (np.ceil(truth) - truth) * LENGTH / 0.75
     late = slice(4 * LENGTH, None)
     off = (np.array(left) - true + 40) % 80 - 40
     assert np.median(np.abs(off[late])) < 0.04 * LENGTH / 0.75
+    assert np.median(rates[200:]) == pytest.approx(0.75, rel=0.1)
     assert now.cycle == int(truth[-1])
 
 
@@ -232,17 +220,6 @@ def test_course_of_made_phases():
     # Begun anew 4 before.
     single.follow(16.0, np.array([2.0]), np.array([1]))
     assert single.time_left() == 0.8 * 16 + 0.2 * 16
-
-
-def test_angles_of_people_held_out():
-    known, walks = make_gait(8, random_state=0), make_gait(10, 8, takes=True, random_state=0)
-    live = OnlineSynchronizer(DenseSynchronizer(P), frame_rate=100, cyclic=True).fit(known.data)
-    for x, events in zip(walks.data[8:], walks.events[8:], strict=True):
-        (found,) = live.track([x])
-        strikes = [e["frame"] for e in events if e["label"] == "Foot Strike"]
-        rises = 1 + np.flatnonzero(np.diff(found.cycle))
-        np.testing.assert_allclose(rises, strikes, atol=8)
-        assert np.mean(found.confidence[120:] > 0.5) > 0.9
 
 
 def test_walks_of_a_real_person(real_data):
@@ -389,14 +366,13 @@ def test_attempts_of_streams_equal_those_alone(single):
     np.testing.assert_allclose([step.phase[0] for step in after], alone[0].phase[:26], atol=1.5)
 
 
-def test_second_attempts_of_real_people_held_out(real_data):
-    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
+def test_second_attempts_of_real_people_held_out(hdm05):
     off, told, n = [], 0, 0
     for action in ("depositFloorR", "grabHighR"):
-        features = make_pipeline(DirectionCosines(bunch.skeleton), ASpace())
-        chosen = bunch.target == action
+        features = make_pipeline(DirectionCosines(hdm05.skeleton), ASpace())
+        chosen = hdm05.target == action
         known, new = (
-            [bunch.data[i][::4] for i in np.flatnonzero(chosen & ((bunch.actor == "tr") == held))]
+            [hdm05.data[i][::4] for i in np.flatnonzero(chosen & ((hdm05.actor == "tr") == held))]
             for held in (False, True)
         )
         live = OnlineSynchronizer(DenseSynchronizer(100)).fit(features.fit_transform(known))

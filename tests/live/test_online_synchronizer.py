@@ -78,19 +78,6 @@ def test_phase_and_rate_follow_known_warps(fitted, n_frames, bend):
     assert np.mean(found.confidence) > (0.8 if bend == 0 else 0.3)
 
 
-def test_track_equals_step_and_does_not_look_ahead(fitted, live):
-    x, _ = trial(70, 0.4, 0.05, 5)
-    x[0, 1] = x[7:9, 2] = np.nan
-    whole, part = fitted.track([x, x[:40]])
-    steps = step_all(live, x)
-    names = ("phase", "rate", "confidence", "lower", "upper", "cycle")
-    for values, name in zip(whole, names, strict=True):
-        np.testing.assert_array_equal(values, [getattr(step, name) for step in steps])
-        np.testing.assert_array_equal(values[:40], getattr(part, name))
-        np.testing.assert_array_equal(values, getattr(live.history, name))
-    assert all(isinstance(value, float) for value in steps[0][:5])
-
-
 def test_costs_at_the_end_equal_offline_trellis_to_the_last_bit():
     mean, x = movement(np.linspace(0, 1, P)), trial(75, 0.4, 0.05)[0]
     unit = Unit.of(mean[np.newaxis])
@@ -215,16 +202,19 @@ def test_constant_features_say_nothing_of_the_phase(sync):
 
 
 def test_estimates_of_streams_equal_their_definitions():
-    """Rate, confidence and mean cost of two streams, one of which is hidden at times."""
+    """Rate, confidence, bounds and mean cost of two streams, one of which is another movement that
+    is hidden at times.
+    """
     X = [trial(50 + i, 0.1 * (i - 3), 0.02, i)[0] for i in range(7)]
     live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X)
-    reference = Reference(live.synchronizer_.features_, live.mean_, live.duration_, 8.0, 1.5)
+    given = live.synchronizer_.features_, live.mean_, live.duration_
+    reference = Reference(*given, 1e-4, typical_cost=5e-5, interval_temperature=3e-5)
     # The last pose is held until the filters, 1.77 frames wide, have forgotten the movement.
     assert len(reference.moving) == 2 * (P - 1) + 1 + 2 * 11
     streams = Streams(reference, 2, 3)
-    x, y = trial(75, 0.3, 0.1, 8)[0], trial(75, 0.0, 0.02, 9)[0]
-    y[20:23] = y[40, :2] = np.nan
-    phases, costs, shares = [], [], []
+    x, y = trial(75, 0.3, 0.1, 8)[0], np.roll(trial(75, 0.0, 0.02, 9)[0], 1, axis=1)
+    y[20:23] = y[40, :2] = y[50:53, 2] = np.nan
+    phases, costs, shares, part = [], [], [], np.ones(2)
     for sample in np.stack([x, y], axis=1):
         known = streams.trellis.best()[1] if phases else np.zeros(2)
         streams.update(sample)
@@ -245,13 +235,25 @@ def test_estimates_of_streams_equal_their_definitions():
                 if seen[i]:
                     mean_cost += weight * (cost[i] / seen[i] - mean_cost)
             assert streams.mean_cost[i] == pytest.approx(mean_cost)
-            mass = np.exp(log_softmax(-streams.trellis.costs[i] / 8))
+            mass = np.exp(log_softmax(-streams.trellis.costs[i] / 1e-4))
             positions = np.minimum(np.arange(len(mass)) / 2, P - 1)
             mass = mass[np.abs(positions - phases[-1][i]) <= 0.05 * (P - 1)].sum()
-            expected = share * mass / max(mean_cost / 1.5, 1) ** 2
+            expected = share * mass / max(mean_cost / 5e-5, 1) ** 2
             assert found.confidence[i] == pytest.approx(expected)
+        # Of the features, where anything is seen.
+        part += (shares[-1] > 0) * (shares[-1] - part) / min(n, 6)
+        excess = np.maximum(streams.mean_cost / 5e-5, 1)
+        temperature = 3e-5 * excess / part**2 * np.maximum(excess / 4, 1) ** 2
+        gains = gains_of(streams.trellis.costs)[:, ::2]
+        bounds = phase_bounds(gains, temperature, found.phase, P - 1)
+        np.testing.assert_allclose([found.lower, found.upper], bounds, atol=1e-9)
+    # The other movement costs more than four times what is typical.
+    assert streams.mean_cost[1] > 2e-4
+    # Until the next sample they move with the phase.
     later = streams.estimate(0.5)
-    np.testing.assert_allclose(later.phase, np.minimum(found.phase + found.rate / 2, P - 1))
+    for name in ("phase", "lower", "upper"):
+        expected = np.minimum(getattr(found, name) + found.rate / 2, P - 1)
+        np.testing.assert_allclose(getattr(later, name), expected)
 
 
 # -- streams and sessions -----------------------------------------------------------------

@@ -8,7 +8,6 @@ import pytest
 from joblib import parallel_config
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn_motionsync import DirectionCosines, to_frame
-from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.recognition import distances, synchronization_distances
 from sklearn_motionsync.recognition.distances import (
     BLOCK,
@@ -255,20 +254,19 @@ def test_two_frames_and_a_rate_above_the_number_of_frames():
 # -- people -----------------------------------------------------------------------------
 
 
-def test_nearest_neighbours_among_new_people(real_data):
+def test_nearest_neighbours_among_new_people(utkinect):
     """The nearest clip of nine other people is of the same action, with normalize."""
-    bunch = load_trials(real_data / "utkinect" / "utkinect_positions.npz")
-    X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    X = DirectionCosines(utkinect.skeleton).fit_transform(utkinect.data)
     right = {}
     for normalize in (True, False):
         D = synchronization_distances(X, cost="velocity", normalize=normalize, n_frames=20)
-        found = np.empty_like(bunch.target)
-        for actor in np.unique(bunch.actor):
-            out = bunch.actor == actor
+        found = np.empty_like(utkinect.target)
+        for actor in np.unique(utkinect.actor):
+            out = utkinect.actor == actor
             nearest = KNeighborsClassifier(1, metric="precomputed")
-            nearest.fit(D[np.ix_(~out, ~out)], bunch.target[~out])
+            nearest.fit(D[np.ix_(~out, ~out)], utkinect.target[~out])
             found[out] = nearest.predict(D[np.ix_(out, ~out)])
-        right[normalize] = np.mean(found == bunch.target)
+        right[normalize] = np.mean(found == utkinect.target)
     assert right[True] > 0.8
     assert right[False] < 0.75
 
