@@ -102,30 +102,6 @@ def test_a_switched_constant_changes_warps_and_leaves_nothing_behind(constants):
     assert constants.judged(of_columns) == before
 
 
-def test_constants_are_ranked_and_the_small_are_marked(constants, capsys):
-    chosen = [
-        one for one in constants.CONSTANTS if one.name in ("consensus", "smoothness", "max_rate")
-    ]
-    consensus, smoothness, max_rate = chosen
-    changes = {
-        consensus: {"half": np.array([0.0, 0.0])},
-        smoothness: {"half": np.array([0.6, -0.9]), "double": np.array([0.1, 0.0])},
-        max_rate: {"off": np.array([0.5, -30.0])},
-    }
-    constants.print_changes(changes, ["pairs", "warps"])
-    *rows, _, last = capsys.readouterr().out.splitlines()
-    assert [row.split("|")[-2].strip() for row in rows[-4:]] == [
-        "30.0",
-        "0.9, below 1",
-        "",
-        "no effect",
-    ]
-    assert rows[-4].startswith("| `parameters.max_rate` = 4 | largest rate of a path | off | 20 |")
-    assert last == (
-        "Worth less than 1 % in all columns: `parameters.smoothness`, `parameters.consensus`."
-    )
-
-
 def test_moments_of_unseen_actions_and_landmarks_are_read(constants, real_data):
     unseen = constants.read_unseen(real_data / "events44" / "events44.npz")
     assert len(unseen) == 23

@@ -51,13 +51,3 @@ def test_held_out_share_equals_its_definition(neuroscience):
             total += ((trial - known.mean(axis=(0, 1))) ** 2).sum()
     assert neuroscience.held_out_r2(counts, positions) == pytest.approx(1 - missed / total)
     assert missed > total  # there is nothing to be explained
-
-
-def test_margins_are_cut_off_again(neuroscience):
-    counts, positions = neuroscience.make_trials(0, "shift")
-    counts, positions = counts[:12], positions[:12]
-    for margin in (0, 15):
-        found = neuroscience.dense(2, margin)(counts)
-        assert found.shape == positions.shape
-        off = found - positions
-        assert np.abs(off - off.mean(axis=0))[:, 40:110].mean() < 3  # of 7 bins as recorded

@@ -452,46 +452,6 @@ def test_published_simulations(name, what, real_data):
 # -- designs ------------------------------------------------------------------------------
 
 
-def bumps(heights, delays):
-    t = np.linspace(0, 1, 60)
-    noise = np.random.default_rng(0).standard_normal((len(heights), 60)) * 0.02
-    moments = t - np.asarray(delays)[:, np.newaxis] * np.sin(np.pi * t) ** 2
-    bump = np.exp(-(((moments - 0.5) / 0.1) ** 2))
-    return list((np.asarray(heights)[:, np.newaxis] * bump + noise)[:, :, np.newaxis])
-
-
-@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
-@pytest.mark.parametrize("design", ["paired", "between", "within", "three"])
-def test_designs_find_a_later_bump_and_a_higher_one(design):
-    rng, n = np.random.default_rng(5), 12
-    people = np.repeat(np.arange(n), 2)
-    second = np.tile([0, 1], n)
-    given = {"groups": people.tolist(), "n_permutations": 199}
-    if design == "paired":
-        by, given = second, {**given, "y": second.tolist(), "paired": True}
-    elif design == "within":
-        speed = second + 0.2 * rng.standard_normal(2 * n)
-        by, given = speed, {**given, "y": speed, "covariate": True}
-    elif design == "between":
-        age = np.repeat(rng.uniform(0, 1, n), 2)
-        by, given = age, {**given, "y": age, "covariate": True}
-    else:
-        by = np.repeat(np.arange(n) % 3, 2) / 2
-        given["y"] = (2 * by).astype(int).tolist()
-    own = np.repeat(rng.normal(0, 0.05, n), 2)
-    for what in ("shape", "timing"):
-        heights = 1 + own + (0.5 * by if what == "shape" else 0)
-        delays = 0.2 * own + (0.08 * by if what == "timing" else 0)
-        X = bumps(heights, delays)
-        sync = DenseSynchronizer(60).fit(X)
-        found = compare_groups(sync, X, **given)
-        assert found.clusters.iloc[0]["what"] == what, (what, found)
-        assert found.n_units == n
-        word = found.clusters.iloc[0].direction
-        right = ("above", "higher") if what == "shape" else ("later",)
-        assert any(part in word for part in right)
-
-
 def test_copies_of_trials_change_nothing_and_another_seed_little(few):
     X, sync = few
     X = [x + 0.06 * (k % 2) for k, x in enumerate(X)]

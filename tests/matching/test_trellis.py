@@ -188,18 +188,6 @@ def test_tile_sizes_change_no_result(n_bases, table, monkeypatch):
 
 
 @pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
-@pytest.mark.parametrize("n_bases", [1, 3])
-@pytest.mark.parametrize("n_frames", [2, 16, 17, 150])
-def test_little_memory_gives_the_same_bits(n_frames, n_bases, table, monkeypatch):
-    """Little memory, the same bits."""
-    monkeypatch.setattr(module, "SMALL_BYTES", [0, 0])
-    bases, moving = draw(np.random.default_rng(3), n_bases, n_frames, table.subframes)
-    trellis = Trellis(table, 0.5, min(40, n_frames - 1))
-    paths = trellis.paths(bases, moving)
-    np.testing.assert_array_equal(trellis.paths(bases, moving, max_bytes=0), paths)
-
-
-@pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
 @pytest.mark.parametrize("whole", [False, True], ids=["reals", "ties"])
 @pytest.mark.parametrize("ends", [{}, {"free": True}], ids=["pinned", "free"])
 @pytest.mark.parametrize("max_bytes", [None, 0])

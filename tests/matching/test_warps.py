@@ -7,6 +7,8 @@ from sklearn_motionsync.matching.consensus import vote
 from sklearn_motionsync.matching.warps import evaluate_warps, even_slices, normalise
 from sklearn_motionsync.metrics import keyframe_error
 
+from made_people import made_people
+
 
 def random_warps(rng, n, n_frames):
     """Non-decreasing, with pinned ends, bent at every frame."""
@@ -75,14 +77,7 @@ def test_vote_equals_the_median_of_all_routes():
 
 @pytest.fixture(scope="module")
 def people():
-    """Forty trials of one movement, of different styles and paces."""
-    rng, t = np.random.default_rng(0), np.linspace(0, 1, 30)
-    X = []
-    for _ in range(40):
-        phase = t + rng.uniform(-0.1, 0.1) * np.sin(np.pi * t)
-        style = 1 + 0.2 * rng.standard_normal(3)
-        X.append(np.column_stack([np.sin(5 * phase), np.cos(4 * phase), phase**2]) * style)
-    return X
+    return made_people(40)
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 9, 10, 40])

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from measure_cases import CASES, CURVES, FIVE, WARPS, make_curves
+from measure_cases import CASES, FIVE, WARPS, make_curves
 from sklearn_motionsync import metrics, to_frame
 from sklearn_motionsync.metrics import (
-    amplitude_phase_variance,
     group_timing_error,
     keyframe_error,
     least_squares,
@@ -123,20 +122,6 @@ def test_spread_of_any_kind_of_input_and_in_any_unit(measure):
         assert measure(frozen * unit, y.astype(float) * unit) == pytest.approx(expected, rel=1e-12)
 
 
-def test_closed_forms_of_spread():
-    x, _ = CURVES
-    mean = x.mean(axis=0)
-    halved, same = mean + (x - mean) / 2, np.stack([mean] * 4)
-    for measure in SPREADS:
-        # Ratios of squares.
-        np.testing.assert_allclose(measure(x, halved), 0.25)
-        assert measure(x, same) < 1e-30
-        assert measure(same, same) == 1
-        np.testing.assert_allclose(measure(x, x), 1)
-    moved = same + np.array([0, 5, 0.7, 1])[:, np.newaxis, np.newaxis]
-    assert sobolev_least_squares(moved, same) == 1
-
-
 CONSTANT = np.full((3, 20, 2), 0.1)
 # Trials that differ by rounding at most, such as sums of three tenths.
 WITHOUT_SPREAD = {
@@ -164,8 +149,3 @@ def test_least_squares_leaves_out_the_mean_of_the_others():
     """0.1, 0.2, 0.3: the second differs from the mean of the others by rounding."""
     x = np.array([0.1, 0.2, 0.3])[:, np.newaxis, np.newaxis] * np.ones((3, 5, 2))
     assert least_squares(x, x[[0, 0, 2]]) == pytest.approx((4 / 9 + 16 / 9) / 2)
-
-
-def test_result_of_the_decomposition_is_a_sum():
-    found = amplitude_phase_variance(*CURVES)
-    np.testing.assert_allclose(found.amplitude + found.phase, found.total)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.matching.costs import COSTS, step_table
 from sklearn_motionsync.matching.matcher import cost_features
 from sklearn_motionsync.matching.trellis import Trellis
@@ -131,17 +130,16 @@ def times_of():
 
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda e: "-".join((*e[:2], *e[3:])))
-def test_key_moment_errors_of_real_people(event, real_data, times_of):
+def test_key_moment_errors_of_real_people(event, hdm05, times_of):
     action, joint, extreme = event[:3]
     (peer_mean, peer_median), (share, most), settings = EVENTS[event]
-    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
-    X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action]
-    height = [x[:, 3 * bunch.joints.index(joint) + 1].astype(float) for x in X]
+    X = [x for x, t in zip(hdm05.data, hdm05.target, strict=True) if t == action]
+    height = [x[:, 3 * hdm05.joints.index(joint) + 1].astype(float) for x in X]
     moments = np.array(
         [extreme(gaussian_filter1d(h, 0.015 * len(h))) * (P - 1) / (len(h) - 1) for h in height]
     )
     errors = []
-    for n, times in enumerate(times_of(action, settings, X, bunch.skeleton)):
+    for n, times in enumerate(times_of(action, settings, X, hdm05.skeleton)):
         landed = [np.interp(moments[n], np.arange(P), tau) for tau in times]
         errors.append(np.delete(np.abs(landed - moments), n))
     assert np.mean(errors) <= share * peer_mean

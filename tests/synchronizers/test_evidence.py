@@ -10,7 +10,6 @@ from sklearn_motionsync import (
     DirectionCosines,
     SynchronizationWarning,
 )
-from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.matching.metric import Evidence
 from sklearn_motionsync.synchronizers.learning import weigh_evidence
 
@@ -90,10 +89,13 @@ KINECT = {"sitDown": False, "throw": True}
 
 
 @pytest.mark.parametrize("action", KINECT)
-def test_people_seen_by_a_kinect(action, real_data):
-    bunch = load_trials(real_data / "utkinect" / "utkinect_positions.npz")
-    X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action and len(x) >= 8]
-    points = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(X))
+def test_people_seen_by_a_kinect(action, utkinect):
+    X = [
+        x
+        for x, t in zip(utkinect.data, utkinect.target, strict=True)
+        if t == action and len(x) >= 8
+    ]
+    points = ASpace().fit_transform(DirectionCosines(utkinect.skeleton).fit_transform(X))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         sync = DenseSynchronizer(P).fit(points)
@@ -101,11 +103,10 @@ def test_people_seen_by_a_kinect(action, real_data):
     assert sync.evidence_.weak is KINECT[action]
 
 
-def test_every_action_of_optical_recordings_is_supported(real_data):
-    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
-    for action in sorted(set(bunch.target))[::2]:
-        X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action]
-        points = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(X))
+def test_every_action_of_optical_recordings_is_supported(hdm05):
+    for action in sorted(set(hdm05.target))[::2]:
+        X = [x for x, t in zip(hdm05.data, hdm05.target, strict=True) if t == action]
+        points = ASpace().fit_transform(DirectionCosines(hdm05.skeleton).fit_transform(X))
         evidence = DenseSynchronizer(P).fit(points).evidence_
         assert evidence.inconsistency < 0.5, action
         assert evidence.remaining < 0.7, action

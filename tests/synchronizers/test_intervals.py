@@ -16,7 +16,6 @@ from sklearn_motionsync import (
     PartSynchronizer,
     SynchronizationWarning,
 )
-from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.inputs import validation
 
 P = 60
@@ -254,12 +253,13 @@ def test_the_way_back_of_a_movement_that_is_alike_both_ways_is_not_doubted(bends
     assert sync.match([np.concatenate([x, x]) for x in X[18:]]).doubtful.mean() > 0.6
 
 
-def test_trials_of_a_set_without_support_are_doubtful(real_data):
-    bunch = load_trials(real_data / "utkinect" / "utkinect_positions.npz")
-    chosen = [i for i, t in enumerate(bunch.target) if t == "throw" and len(bunch.data[i]) >= 8]
+def test_trials_of_a_set_without_support_are_doubtful(utkinect):
+    chosen = [
+        i for i, t in enumerate(utkinect.target) if t == "throw" and len(utkinect.data[i]) >= 8
+    ]
     some = np.unique(np.linspace(0, len(chosen) - 1, 12).astype(int))
-    data = [bunch.data[chosen[i]] for i in some]
-    X = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(0.95)).fit_transform(data)
+    data = [utkinect.data[chosen[i]] for i in some]
+    X = make_pipeline(DirectionCosines(utkinect.skeleton), ASpace(0.95)).fit_transform(data)
     with pytest.warns(SynchronizationWarning):
         sync = DenseSynchronizer(100).fit(X)
     match = sync.match(X)

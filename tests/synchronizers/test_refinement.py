@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-from sklearn_motionsync.datasets import load_trials, make_gait
+from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.matching.filters import white_noise
 from sklearn_motionsync.matching.refinement import SAME_SOURCE, curvature, unexplained_variance
 
@@ -148,15 +148,14 @@ def test_forces_of_people_are_not_refined(file, real_data):
 
 
 @pytest.mark.parametrize("action", ["depositFloorR", "grabHighR"])
-def test_people_are_not_refined(action, real_data):
+def test_people_are_not_refined(action, hdm05):
     """All actors and each by himself, all features and the first few: refining misleads there.
 
     A single curve of one actor may be as alike as copies are.
     """
-    bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
-    chosen = np.flatnonzero(bunch.target == action)
-    poses = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
+    chosen = np.flatnonzero(hdm05.target == action)
+    poses = DirectionCosines(hdm05.skeleton).fit_transform([hdm05.data[i] for i in chosen])
     for actor in (None, "bd", "tr"):
-        mine = [x for x, i in zip(poses, chosen, strict=True) if actor in (None, bunch.actor[i])]
+        mine = [x for x, i in zip(poses, chosen, strict=True) if actor in (None, hdm05.actor[i])]
         counts = (None, 2, 1) if actor is None else (None, 2)
         assert_not_refined_whatever_the_features(mine, counts)

@@ -82,19 +82,6 @@ def pipe():
 # -- results ---------------------------------------------------------------------------------------
 
 
-def test_planted_patterns_are_found():
-    pattern = movement(60)
-    take = take_of({40: pattern, 100: pattern, 250: movement(45, 1.1), 350: movement(80)}, noise=0)
-    trials, locations = find_trials(pattern, take)
-    np.testing.assert_allclose(
-        spans(locations), [[40, 100], [100, 160], [250, 295], [350, 430]], atol=2
-    )
-    assert spans(locations)[0] == [40, 100]
-    assert locations["score"].between(0.9, 1).all()
-    for part, (start, stop) in zip(trials, spans(locations), strict=True):
-        np.testing.assert_array_equal(part, take[start:stop])
-
-
 def test_adjacent_trials_are_found_and_other_movements_are_not(pipe):
     _, locations = find_trials(pipe, TAKE)
     np.testing.assert_allclose(spans(locations), TRUE, atol=6)

@@ -43,12 +43,6 @@ def test_residual_variance_is_the_reconstruction_error(poses):
     np.testing.assert_allclose(aspace.left_out_variance_, by_parameter)
 
 
-def test_rows_and_trials_are_the_same_poses(poses):
-    rows = ASpace().fit(np.concatenate(poses))
-    trials = ASpace().fit(poses)
-    np.testing.assert_array_equal(rows.components_, trials.components_)
-
-
 def test_constant_features_and_constant_data(poses):
     X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in poses]
     aspace = ASpace(1.0).fit(X)
@@ -82,7 +76,3 @@ def test_inverse_transform_refuses_wrong_width(poses):
     aspace = ASpace(2).fit(poses)
     with pytest.raises(ValueError, match="Trial 0 has 3 features a frame, but ASpace"):
         aspace.inverse_transform([np.zeros((4, 3))])
-
-
-def test_names(poses):
-    assert list(ASpace(2).fit(poses).get_feature_names_out()) == ["aspace0", "aspace1"]
