@@ -190,7 +190,8 @@ def test_time_left_of_a_cycle_is_at_the_pace_of_the_last_one(fitted, live):
     late = slice(4 * LENGTH, None)
     off = (np.array(left) - true + 40) % 80 - 40
     assert np.median(np.abs(off[late])) < 0.04 * LENGTH / 0.75
-    assert np.median(rates[200:]) == pytest.approx(0.75, rel=0.1)
+    # Also where a cycle begins.
+    np.testing.assert_allclose(rates[200:], 0.75, atol=0.2)
     assert now.cycle == int(truth[-1])
 
 
