@@ -10,18 +10,6 @@ from sklearn_motionsync import (
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error
 
 
-def test_given_keyframes_coincide(bending, bending_aspace):
-    sync = LinearSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
-    offsets, times, _ = sync.match(bending_aspace, keyframes=bending.keyframes)
-    lengths = [len(x) for x in bending_aspace]
-    pattern = bending.keyframes[sync.pattern_index_] * 99 / (lengths[sync.pattern_index_] - 1)
-    np.testing.assert_allclose(sync.keyframes_, pattern)
-    # Key-frames lie between whole frames, where warps have a corner.
-    assert keyframe_error(times, bending.keyframes, pattern, lengths) < 0.15
-    assert not offsets[sync.pattern_index_].any()
-    assert (np.diff(times) >= 0).all()
-
-
 def test_whole_keyframes_coincide_exactly():
     X = [np.arange(11.0)[:, None] ** 2, np.arange(21.0)[:, None]]
     sync = LinearSynchronizer(11, pattern=0).fit(X, keyframes=[[4, 6], [10, 16]])
