@@ -23,7 +23,8 @@ def read_bvh(path):
     n_channels = sum(len(joint.channels or ()) for joint in joints)
     if not n_channels:
         raise text.error("no joint has CHANNELS, so nothing moves.")
-    values, frame_rate = _read_motion(text, n_channels)
+    values, n_stated, frame_rate = _read_motion(text, n_channels)
+    text.check_count(len(values), n_stated, "Frames:")
     text.check_size(len(values), len(joints))
     parents = [joint.parent for joint in joints]
     offsets = np.array([joint.offset for joint in joints]).T[:, :, None]
@@ -127,18 +128,13 @@ def _read_channels(text, is_end):
 
 
 def _read_motion(text, n_channels):
-    """The channels (n_frames, n_channels) and the frames a second."""
+    """The channels (n_frames, n_channels), the stated number of frames, and frames a second."""
     n_frames = text.count(_read_field(text, b"frames"), "Frames:")
     frame_time = text.positive([_read_field(text, b"frame time")], "Frame Time:")
-    # A number takes two bytes at least, with the blank behind it.
-    if 2 * n_frames * n_channels - 1 > text.n_left:
-        raise text.error(
-            f"Frames: says {n_frames}, each of {counted(n_channels, 'channel')}, but only "
-            f"{text.n_left} bytes follow; the file is not complete, or that line is wrong."
-        )
     values = text.table(n_channels, "a frame (one number a channel)")
-    text.check_n_frames(len(values), n_frames, "Frames:")
-    return values, 1 / frame_time
+    if not len(values):
+        raise text.error("the file ends where frames should follow; it is not complete.")
+    return values, n_frames, 1 / frame_time
 
 
 def _read_field(text, name):

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..inputs.resampling import is_rate
 from ..inputs.wording import counted
-from .text import UNSEEN, decode, make_unique
+from .text import UNSEEN, check_group, decode, make_unique, split_subjects
 
 _BLOCK = 512
 # How processors write numbers: Intel, DEC and MIPS.
@@ -44,7 +44,7 @@ def read_c3d(path, *, group="markers"):
             "units": [unit or None for unit in units],
             "frame_rate": None if rate is None else rate * per_frame,
         }
-    _check_group(file, groups, group)
+    check_group(file.path, groups, group)
     first_frame = _read_first_frame(file, parameters)
     events, n_untimed = _read_events(file, parameters, rate, first_frame)
     facts = {
@@ -65,8 +65,9 @@ def read_c3d(path, *, group="markers"):
         return facts | {"channels": make_unique(channels), "values": values}
     points = members[group][0]
     positions = _read_points(frames, points, computed=group != "markers")
-    joints = make_unique([labels[i] for i in points])
-    return facts | {"joints": joints, "parents": [-1] * len(points), "positions": positions}
+    joints, subjects = split_subjects([labels[i] for i in points], labels)
+    facts |= {"joints": joints, "subjects": subjects, "parents": [-1] * len(points)}
+    return facts | {"positions": positions}
 
 
 # -- the header, and how numbers are written --------------------------------------------
@@ -489,16 +490,6 @@ def _read_point_groups(parameters, labels):
             for i in points:
                 del markers[i]
     return {"markers": (list(markers), marker_unit)} | groups
-
-
-def _check_group(file, groups, group):
-    if group in groups and groups[group]["n"]:
-        return
-    there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
-    raise ValueError(
-        f"{file.path}: there are no {group[:40]} in this file; read_motion(..., group=...) reads "
-        f"{', '.join(there)[:300]}."
-    )
 
 
 def _describe_others(parameters, groups, group, n_untimed):

@@ -3,11 +3,14 @@
 import array
 import io
 import math
+import os
+import warnings
 from collections import Counter
 
 import numpy as np
 import pandas as pd
 
+from ..body.landmarks import guess_feet, guess_landmarks
 from ..inputs.resampling import is_rate
 from ..inputs.wording import counted
 
@@ -110,11 +113,10 @@ class MotionText:
         return number
 
     def count(self, word, what):
-        """A whole number above 0."""
-        number = read_rate(word)
-        if number is None or number > _LARGEST or number != int(number):
-            raise self.error(f"{what} needs a whole number above 0, got {quote([word])}.")
-        return int(number)
+        """A whole number, 0 or more."""
+        if not _is_number(word) or not 0 <= float(word) == int(float(word)):
+            raise self.error(f"{what} needs a whole number, 0 or more, got {quote([word])}.")
+        return int(float(word))
 
     def table(self, n, what):
         """The lines that are left, `n` finite numbers each, as an array (n_lines, n)."""
@@ -133,14 +135,26 @@ class MotionText:
                 rows.append(np.array([self.numbers(words, n, what)]))
         return np.concatenate(rows or [np.empty((0, n))])
 
-    def check_n_frames(self, n_frames, n_stated, name):
-        """Refuse a file that states another number of frames than it has."""
-        if n_stated not in (None, n_frames):
+    def check_count(self, n, n_stated, name, noun="frame"):
+        """Warn, in the caller of `read_motion`, if a file states another number than it has.
+
+        What is there is read. Where the last line has no end, frames may have been lost with it,
+        and the file is refused.
+        """
+        if n_stated in (None, n):
+            return
+        contradiction = f"{name} says {n_stated}, but {counted(n, noun)} follow{'s' * (n == 1)}"
+        if not self._lines.getvalue().endswith(b"\n"):
             raise self.error(
-                f"{name} says {n_stated}, but {counted(n_frames, 'frame')} "
-                f"follow{'s' * (n_frames == 1)}; the file is not complete, or that line is wrong: "
-                "then correct it."
+                f"{contradiction}, and the last line has no end: the file is not complete. Export "
+                "it again, or remove its last line, which may lack digits."
             )
+        warnings.warn(
+            f"{self.path.name}: {contradiction}; what is there is read. If the file is not "
+            "complete, export it again.",
+            UserWarning,
+            stacklevel=5,
+        )
 
     def check_size(self, n_frames, n_joints):
         """Refuse positions out of all proportion to the file, before they are made."""
@@ -150,6 +164,17 @@ class MotionText:
 
     def error(self, message):
         return ValueError(f"{self.path}, line {self.line_number}: {message}")
+
+
+def check_group(path, groups, group):
+    """Refuse a group of which a file has no members."""
+    if group in groups and groups[group]["n"]:
+        return
+    there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
+    raise ValueError(
+        f"{path}: there are no {group[:40]} in this file; read_motion(..., group=...) reads "
+        f"{', '.join(there)[:300] or 'none'}."
+    )
 
 
 def check_result_size(path, file_size, n_bytes, what):
@@ -210,10 +235,11 @@ def split_fields(row, n=None):
     return fields
 
 
-def read_timed_rows(text, rows, time_column):
+def read_timed_rows(text, rows, time_column, what="time", unit="a number of seconds"):
     """The numbers of each row, NaN where one is missing, and how many decimals the times have.
 
-    `rows` yields the fields of one row after the other, as they are read from `text`.
+    `rows` yields the fields of one row after the other, as they are read from `text`. The column
+    may have the number of the frame in place of its time.
     """
     result, decimals, before = [], 0, -math.inf
     for fields in rows:
@@ -221,8 +247,8 @@ def read_timed_rows(text, rows, time_column):
         time = numbers[time_column]
         if not -_LARGEST < time < _LARGEST or time < before:
             raise text.error(
-                "the time of a row must be a number of seconds, and not lie before that of the "
-                f"row above, got {time:g} after {before:g}."
+                f"the {what} of a row must be {unit}, and not lie before that of the row above, "
+                f"got {time:g} after {before:g}."
             )
         before = time
         decimals = max(decimals, _count_decimals(fields[time_column]))
@@ -267,6 +293,16 @@ def _count_decimals(field):
     return len(field.strip().partition(b".")[2]) if b"e" not in field.lower() else 17
 
 
+def hide_unseen(positions):
+    """NaN where a marker has no position, or the one that writers give to markers not seen."""
+    zero = (positions == 0).all(axis=2)
+    unseen = np.isnan(positions).any(axis=2) | (positions == UNSEEN).all(axis=2)
+    if not (zero | unseen).all():
+        unseen |= zero
+    positions[unseen] = np.nan
+    return positions
+
+
 # -- names and quotations ---------------------------------------------------------------
 
 
@@ -299,6 +335,37 @@ def make_unique(names):
     return result
 
 
+def split_subjects(names, among=None):
+    """Names of markers without the prefixes that name subjects, and the subject of each.
+
+    A prefix is what is before the last colon, as in "Ann:LASI", where several names have it
+    (`among` lists all of a file, by default `names`); or what is before an underscore in every
+    name, as in "Ann_LASI", where landmarks are known by what is left. The subject of other names
+    is "".
+    """
+    among = names if among is None else among
+    shared = Counter(name.rpartition(":")[0] for name in among if not name.endswith(":"))
+    pairs = [name.rpartition(":") for name in names]
+    subjects = [a if shared[a] > 1 and b else "" for a, _, b in pairs]
+    if not any(subjects) and (prefix := _common_prefix(among)):
+        subjects = [prefix] * len(names)
+    markers = [n[len(s) + 1 :] if s else n for n, s in zip(names, subjects, strict=True)]
+    return markers if any(subjects) else make_unique(markers), subjects
+
+
+def _common_prefix(names):
+    """What is before an underscore in every name, without a side, if half of the rest is known."""
+    prefix = os.path.commonprefix(names).rpartition("_")[0]  # noqa: RUF071
+    while prefix.lower().rpartition("_")[2] in ("l", "r", "left", "right"):
+        prefix = prefix.rpartition("_")[0]
+    rest = [name[len(prefix) + 1 :] for name in names]
+    if len(rest) < 2 or not prefix:
+        return ""
+    landmarks = guess_landmarks(rest)
+    known = {*landmarks.values(), *guess_feet(rest, landmarks).values()}
+    return prefix if 2 * len(known) >= len(rest) else ""
+
+
 # -- MOT and STO -----------------------------------------------------------------------------------
 
 # The components of a column, by the DataType of the file.
@@ -327,7 +394,7 @@ def read_storage(path):
     frames, decimals = read_timed_rows(text, rows, time_column=0)
     for key, name in ((b"nrows", "nRows"), (b"datarows", "datarows")):
         if key in header:
-            text.check_n_frames(len(frames), text.count(header[key], name), name)
+            text.check_count(len(frames), text.count(header[key], name), name)
     values = np.frombuffer(b"".join(frames)).reshape(len(frames), -1)
     forces = all(any(word in label.lower() for word in _FORCES) for label in labels)
     columns = [f"{a}_{b}" for a in labels for b in components] if components else labels

@@ -7,14 +7,14 @@ import numpy as np
 
 from ..inputs.wording import counted
 from .text import (
-    UNSEEN,
     MotionText,
     decode,
-    make_unique,
+    hide_unseen,
     quote,
     read_rate,
     read_timed_rows,
     split_fields,
+    split_subjects,
 )
 
 _AXIS = re.compile(rb"[XYZxyz]\d*")
@@ -32,17 +32,20 @@ def read_trc(path):
     names, row = _read_names(text, header)
     rows = _split_rows(text, row, len(names))
     frames, decimals = read_timed_rows(text, rows, time_column=1)
-    text.check_n_frames(len(frames), header["numframes"], "NumFrames")
+    text.check_count(len(frames), header["numframes"], "NumFrames")
     # Blank columns at the end of a row take no bytes of the file.
     text.check_size(len(frames), len(names))
     values = np.full((len(frames), 2 + 3 * len(names)), np.nan)
     for i, frame in enumerate(frames):
         values[i, : len(frame)] = frame
+    text.check_count(len(names), header["nummarkers"], "NumMarkers", "marker")
+    names, subjects = split_subjects(names)
     number = values[0, 0]
     return {
-        "joints": make_unique(names),
+        "joints": names,
+        "subjects": subjects,
         "parents": [-1] * len(names),
-        "positions": _hide_unseen(values[:, 2:].reshape(len(frames), -1, 3)),
+        "positions": hide_unseen(values[:, 2:].reshape(len(frames), -1, 3)),
         "times": values[:, 1].copy(),
         "decimals": decimals,
         "frame_rate": header["datarate"],
@@ -92,6 +95,9 @@ def _read_names(text, header):
         if letters != b"xyz" * n:
             raise text.error(f"expected X1 Y1 Z1 X2 Y2 Z2 ..., got {quote(axes)}.")
         row = text.row()
+    if len(names) != n and len(split_fields(row, 2 + 3 * len(names))) == 2 + 3 * len(names):
+        # The columns of the first frame agree with the names.
+        n = len(names)
     if len(names) != n or not n:
         # Some markers may have no name: then those of the others are in every third column.
         places = labels[: 3 * n : 3]
@@ -119,13 +125,3 @@ def _split_rows(text, row, n_markers):
             )
         yield fields
         row = text.row()
-
-
-def _hide_unseen(positions):
-    """NaN where a marker has no position, or the one that writers give to markers not seen."""
-    zero = (positions == 0).all(axis=2)
-    unseen = np.isnan(positions).any(axis=2) | (positions == UNSEEN).all(axis=2)
-    if not (zero | unseen).all():
-        unseen |= zero
-    positions[unseen] = np.nan
-    return positions

@@ -152,6 +152,8 @@ def run_case(files, folder):
                 "by its times",
                 "scale",
                 "become missing",
+                "says .* but .* follow",
+                "holds . subjects",
             ):
                 warnings.filterwarnings("ignore", message=rf"a\.\w+: .*{message}")
             results = read_all(path, folder)

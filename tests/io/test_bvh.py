@@ -164,13 +164,16 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         (small(motion="Frame: 1\nFrame Time: 1\n1 2 3\n"), "expected 'Frames: <number>', got 'Fr"),
         (small(motion="Frames 1\nFrame Time: 1\n1 2 3\n"), "expected 'Frames: <number>', got 'Fr"),
         (small(motion="Frames: 1\nTime: 1\n1 2 3\n"), "expected 'Frame Time: <number>', got 'Ti"),
-        (small(motion="Frames: -1\n"), "Frames: needs a whole number above 0, got '-1'"),
+        (small(motion="Frames: -1\n"), "Frames: needs a whole number, 0 or more, got '-1'"),
         (small(motion="Frames: 1\nFrame Time: 0\n1 2 3"), "Frame Time: must be above 0"),
         (small(motion="Frames: 1\nFrame Time: inf\n1 2 3"), "Frame Time: needs finite numbers"),
-        (small(motion="Frames: 9999999999\nFrame Time: 1\n1 2 3\n"), "but only 6 bytes follow"),
-        (small(motion="Frames: 1\nFrame Time: 1\n1 2\n"), "but only 4 bytes follow"),
-        (small(motion="Frames: 2\nFrame Time: 1\n1.00 2.00 3.00\n"), "2, but 1 frame follows"),
-        (small(motion="Frames: 1\nFrame Time: 1\n1 2 3\n4 5 6\n"), "1, but 2 frames follow"),
+        (
+            small(motion="Frames: 9999999999\nFrame Time: 1\n1 2 3"),
+            "9, but 1 frame follows, and",
+        ),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 2\n"), "a frame .* needs 3 numbers, got 2"),
+        (small(motion="Frames: 2\nFrame Time: 1\n1.00 2.00 3.00\n4 5"), "needs 3 numbers, got 2"),
+        (small(motion="Frames: 4\nFrame Time: 1\n\n"), "the file ends where frames should follow"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 2 \n"), r"line 10: a frame .* needs 3 numbers"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 nan 3\n"), "finite numbers .*got 'nan'"),
     ],
@@ -178,6 +181,16 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
 def test_wrong_files_are_refused(tmp_path, text, message):
     with pytest.raises(ValueError, match=rf"a\.bvh, {message}|a\.bvh, line \d+: .*{message}"):
         read_motion(put(tmp_path, text))
+
+
+@pytest.mark.parametrize("stated", [0, 1, 3, 9999999999])
+def test_stated_frames_that_contradict_those_that_are_there_are_a_warning(tmp_path, stated):
+    expected = read_motion(put(tmp_path, body()))
+    text = body().replace("Frames: 3", f"Frames: {stated}")
+    n = text.rindex("\n", 0, -1) + 1  # without the last row
+    with pytest.warns(UserWarning, match=rf"Frames: says {stated}, but 2 frames follow") as caught:
+        pd.testing.assert_frame_equal(read_motion(put(tmp_path, text[:n])), expected[:2])
+    assert caught[0].filename == __file__
 
 
 def test_small_file_with_a_huge_result_is_refused(tmp_path):

@@ -94,14 +94,23 @@ def test_missing_values_are_nan_with_a_warning(tmp_path, nothing):
     assert df.interpolate(limit=10, limit_area="inside").notna().all(axis=None)
 
 
+@pytest.mark.parametrize("stated", [0, 49, 51])
+def test_stated_rows_that_contradict_those_that_are_there_are_a_warning(tmp_path, stated):
+    for key in ("nRows", "datarows"):
+        text = TEXT.replace("nRows=50", f"{key}={stated}")
+        with pytest.warns(UserWarning, match=rf"a\.mot: {key} says {stated}, but 50 frames follow"):
+            np.testing.assert_array_equal(read(tmp_path, text), VALUES)
+        with pytest.raises(ValueError, match=rf"{key} says {stated}, .* the file is not complete"):
+            read(tmp_path, text[:-1])
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (("endheader", "end"), r"line 56: the file ends where 'endheader' should follow"),
         (("time\t", "t\t"), r"line 6: expected 'time' and the names of the other columns, got 't"),
         (("\tknee_angle_r", "\t"), "line 6: expected 'time' and the names"),
-        (("nRows=50", "nRows=51"), "nRows says 51, but 50 frames follow"),
-        (("nRows=50", "nRows=x"), "nRows needs a whole number above 0, got 'x'"),
+        (("nRows=50", "nRows=x"), "nRows needs a whole number, 0 or more, got 'x'"),
         (("\n0.08000000\t", "\n0.08000000\t7\t"), "line 15: a row needs its time and 3 columns"),
         (("\n0.08000000\t", "\n0.08000000\tx"), "line 15: a frame needs numbers, .* got 'x"),
         (("\n0.08000000\t", "\n0.08000000\t0,"), "line 15: a frame needs numbers, .* got '0,"),

@@ -10,6 +10,7 @@ from sklearn_motionsync.io.text import (
     read_rate,
     read_timed_rows,
     split_fields,
+    split_subjects,
 )
 
 from motion_files import put
@@ -96,15 +97,15 @@ def test_positive_numbers_have_an_inverse_below_the_limit(tmp_path, word, number
 
 @pytest.mark.parametrize(
     ("word", "count"),
-    [("1", 1), ("3.0", 3), ("1e12", 10**12), ("0", 0), ("-1", 0), ("1.5", 0), ("1e13", 0)]
-    + [(word, 0) for word in ("nan", "inf", "x", "")],
+    [("1", 1), ("3.0", 3), ("9e11", 9 * 10**11), ("0", 0), ("-0", 0)]
+    + [(word, None) for word in ("-1", "1.5", "1e13", "1_0", "nan", "inf", "x", "")],
 )
-def test_counts_are_whole_numbers_above_0(tmp_path, word, count):
+def test_counts_are_whole_numbers(tmp_path, word, count):
     text = opened(tmp_path, "")
-    if count:
+    if count is not None:
         assert text.count(word.encode(), "it") == count
     else:
-        with pytest.raises(ValueError, match=f"it needs a whole number above 0, got '{word}'"):
+        with pytest.raises(ValueError, match=f"it needs a whole number, 0 or more, got '{word}'"):
             text.count(word.encode(), "it")
 
 
@@ -267,3 +268,31 @@ def test_names_that_come_again_get_the_next_free_number(seed):
         expected.append(f"{name}_{number}")
     assert make_unique(names) == expected
     assert len(set(expected)) == len(names)
+
+
+@pytest.mark.parametrize(
+    ("names", "subjects"),
+    [
+        (["Ann:LASI", "Ann:RASI", "*12", "C:7"], ["Ann", "Ann", "", ""]),
+        (
+            ["Ann:LASI", "Ann:RASI", "Bob:LASI", "Bob:", "Bob:RASI"],
+            ["Ann", "Ann", "Bob", "", "Bob"],
+        ),
+        (["lab:Ann:LASI", "lab:Ann:RASI", ":a", ":b"], ["lab:Ann", "lab:Ann", "", ""]),
+        (["Ann:LASI"], [""]),
+        (["Ann_LASI", "Ann_RASI"], ["Ann", "Ann"]),
+        (["s_01_LKNE", "s_01_LANK", "s_01_LTHI"], ["s_01"] * 3),
+        (["Ann_LASI", "Ann_RASI", "SACR"], ["", "", ""]),
+        (["L_Knee", "L_Ankle"], ["", ""]),
+        (["Ann_Left_Knee", "Ann_Left_Ankle"], ["Ann", "Ann"]),
+        (["box_front", "box_back", "box_top"], ["", "", ""]),
+        (["M_1", "M_2", "M_3"], ["", "", ""]),
+        (["Ann_LASI"], [""]),
+        ([], []),
+    ],
+)
+def test_names_are_split_into_subject_and_marker(names, subjects):
+    markers, found = split_subjects(names)
+    assert found == subjects
+    assert markers == [n[len(s) + bool(s) :] for n, s in zip(names, subjects, strict=True)]
+    assert split_subjects(["Ann:LKneeAngles"], ["Ann:LKneeAngles", "Ann:LASI"])[1] == ["Ann"]

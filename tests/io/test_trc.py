@@ -48,7 +48,6 @@ LABELS, AXES = HEAD.split("\n")[3:5]
         # Fewer words in the header, blanks in it, and numbers that were never brought up to date.
         TEXT.replace("\tOrigNumFrames", "").replace("\t1\t40\nFrame", "\t1\nFrame"),
         TEXT.replace("mm\t50.00", "mm   50.00"),
-        TEXT.replace("\t3\tmm", "\t41\tmm"),
         TEXT.replace("DataRate\t", "datarate\t").replace("PathFileType\t4", "PATHFILETYPE 4"),
         # Between blanks.
         trc(tracks(), ["LASI", "R.Knee_Lat", "V_Sacral"]).replace("\t", "  "),
@@ -63,15 +62,36 @@ def test_variants_of_programs_are_the_same(tmp_path, text):
     assert df.attrs["units"] == "mm"
 
 
-def test_without_a_row_of_axes_the_header_says_how_many_markers_there_are(tmp_path):
-    bare = TEXT.replace(AXES + "\n", "").replace("\t3\tmm", "\t41\tmm")
-    with pytest.raises(ValueError, match="line 4 names 3 markers, but there are columns for 41"):
-        read(tmp_path, bare)
+@pytest.mark.parametrize("axes", ["", AXES + "\n"])
+@pytest.mark.parametrize("stated", [0, 2, 41])
+def test_stated_markers_that_contradict_names_and_columns_are_a_warning(tmp_path, axes, stated):
+    text = TEXT.replace(AXES + "\n", axes).replace("\t3\tmm", f"\t{stated}\tmm")
+    with pytest.warns(UserWarning, match=f"NumMarkers says {stated}, but 3 mark") as caught:
+        df = read(tmp_path, text)
+    assert caught[0].filename == __file__
+    pd.testing.assert_frame_equal(df, read(tmp_path, TEXT))
+
+
+@pytest.mark.parametrize("n", [1, 12, 39])
+def test_rows_that_were_cut_are_a_warning(tmp_path, n):
+    rows = BODY.splitlines(keepends=True)
+    for stated in (0, 900):
+        text = HEAD.replace("\t40\t3\tmm", f"\t{stated}\t3\tmm") + "\n\n" + "".join(rows[-n:])
+        message = rf"^a\.trc: NumFrames says {stated}, but {n} frames? follows?; what is there is"
+        with pytest.warns(UserWarning, match=message) as caught:
+            df = read(tmp_path, text)
+        assert len(caught) == 1
+        assert caught[0].filename == __file__
+        np.testing.assert_array_equal(df, tracks()[-n:].reshape(n, 9))
+        # The last number may lack digits.
+        with pytest.raises(ValueError, match=rf"{stated}, but {n} frames? .* the last line has no"):
+            read(tmp_path, text[:-1])
 
 
 def test_names_are_unique_and_complete(tmp_path):
     df = read(tmp_path, trc(tracks(), ["Anna:KNEE", "Anna:KNEE", "*12"]))
-    assert df.attrs["joints"] == ["Anna:KNEE", "Anna:KNEE_2", "*12"]
+    assert df.attrs["joints"] == ["KNEE", "KNEE_2", "*12"]
+    assert df.attrs["subject"] == "Anna"
     df = read(tmp_path, trc(tracks(), ["a", "", "f\xfc\xdf"]).encode("latin-1"))
     assert df.attrs["joints"] == ["a", "marker_2", "f\xfc\xdf"]
 
@@ -148,8 +168,7 @@ def test_contradiction_of_rate_and_times_is_a_warning(tmp_path):
     [
         (("PathFileType", "Path"), "line 1: expected 'PathFileType', with which .* got 'Path 4"),
         (("DataRate\tCameraRate\tNumFrames", "a\tb\tc"), "line 2: expected 'DataRate Camera"),
-        (("\t40\t3\tmm", "\t41\t3\tmm"), "NumFrames says 41, but 40 frames follow"),
-        (("\t40\t3\tmm", "\tmany\t3\tmm"), "line 3: NumFrames needs a whole number above 0, g"),
+        (("\t40\t3\tmm", "\tmany\t3\tmm"), "line 3: NumFrames needs a whole number, 0 or more, g"),
         (("Frame#\tTime", "LASI\tRASI"), "line 4: expected 'Frame# Time' and the names"),
         (("Knee Lat", "Knee Lat\tand"), "line 5: line 4 names 4 markers, .* columns for 3"),
         (("\tV_Sacral", "\t"), None),
