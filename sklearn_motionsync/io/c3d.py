@@ -7,7 +7,15 @@ import numpy as np
 
 from ..inputs.resampling import is_rate
 from ..inputs.wording import counted
-from .text import UNSEEN, check_group, decode, make_unique, split_subjects
+from .text import (
+    UNSEEN,
+    check_group,
+    decode,
+    describe_events,
+    describe_groups,
+    make_unique,
+    split_subjects,
+)
 
 _BLOCK = 512
 # How processors write numbers: Intel, DEC and MIPS.
@@ -404,28 +412,14 @@ def _read_first_frame(file, parameters):
 
 
 def _read_events(file, parameters, rate, first_frame):
-    """Events by time, and the number of those without a time.
-
-    Each is a dict of its label, its context, its time in seconds of the trial, and its frame
-    in the recording, from 0; None where the frame rate is not known.
-    """
+    """Events by time, and the number of those without a time."""
     # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
     start = max(first_frame - 1, 0)
     entries = _read_event_parameters(parameters)
     if entries is None:
         entries = _read_header_events(file, 0.0 if rate is None else start / rate)
-    events = [
-        {
-            "label": label,
-            "context": context or None,
-            "time": time,
-            "frame": None if rate is None else round(time * rate - start, 5),
-        }
-        # The file's numbers have 24 bits.
-        for label, context, time in ((*texts, round(time, 6)) for *texts, time in entries)
-        if math.isfinite(time)
-    ]
-    return sorted(events, key=lambda event: event["time"]), len(entries) - len(events)
+    events = describe_events(entries, rate, start)
+    return events, len(entries) - len(events)
 
 
 def _read_event_parameters(parameters):
@@ -494,16 +488,7 @@ def _read_point_groups(parameters, labels):
 
 def _describe_others(parameters, groups, group, n_untimed):
     """The contents of the file beside the group, in one line; empty if there are none."""
-    contents = []
-    for name, facts in groups.items():
-        if name == group or not facts["n"]:
-            continue
-        if name == "analog":
-            rate = facts["frame_rate"]
-            at = "" if rate is None else f" at {rate:g} Hz"
-            contents.append(f"{counted(facts['n'], 'analog channel')}{at}")
-        else:
-            contents.append(counted(facts["n"], name.removesuffix("s")))
+    contents = describe_groups(groups, group, {})
     plates = parameters.number("FORCE_PLATFORM", "USED", 0)
     if math.isfinite(plates) and plates > 0:
         contents.append(f"the geometry of {counted(plates, 'force plate')}")

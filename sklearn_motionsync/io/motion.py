@@ -23,6 +23,7 @@ from .acclaim import read_acclaim
 from .bvh import read_bvh
 from .c3d import read_c3d
 from .gaps import check_filling, fill_gaps, warn_of_gaps
+from .labs import QTM, VICON, read_motive, read_qtm, read_vicon
 from .text import FARTHEST, make_unique, read_storage
 from .trc import read_trc
 
@@ -83,6 +84,14 @@ FORMATS = [
     MotionFormat(None, (".c3d",), lambda path, head: head[1:2] == b"\x50", read_c3d),
     MotionFormat(None, (".trc",), lambda path, head: head.startswith(b"PathFileType"), read_trc),
     MotionFormat(None, (".mot", ".sto"), lambda path, head: False, read_storage),
+    MotionFormat("vicon", (".csv",), lambda path, head: bool(VICON.search(head)), read_vicon),
+    MotionFormat("qtm", (".tsv",), lambda path, head: bool(QTM.match(head)), read_qtm),
+    MotionFormat(
+        "motive",
+        (".csv",),
+        lambda path, head: head.lstrip(b'"').startswith(b"Format Version"),
+        read_motive,
+    ),
 ]
 ENDINGS = tuple(ending for each in FORMATS for ending in each.endings)
 
@@ -120,9 +129,10 @@ def read_motion(
         "trim" leaves out the frames before the first and after the last one in which all joints or
         markers are seen; see `fill_gaps`. Other groups of the file are longer then.
     group : str, default=None
-        The group of a C3D file to read: by default its "markers"; "angles", "forces", "moments",
-        "powers", "scalars" or "reactions", if the file has such points; "analog" for the analog
-        channels. Of several files those that have no such group are left out.
+        The group of a C3D file or of a CSV of Vicon Nexus to read: by default its "markers";
+        "angles", "forces", "moments", "powers", "scalars" or "reactions", if the file has such
+        points; "analog" for the analog channels. Of a CSV of Motive "joints" or "markers". Of
+        several files those that have no such group are left out.
     columns : {None, "common"}, default=None
         Of several files: "common" leaves out the columns that some of them lack, such as other
         markers, and brings the others into the order of the first. By default all stay.

@@ -56,11 +56,11 @@ class MotionText:
         """Bytes after the line read last."""
         return self.size - self._lines.tell()
 
-    def row(self):
-        """The next line that has words, as it is; empty at the end."""
+    def row(self, blanks=None):
+        """The next line that has more than `blanks`, by default words; empty at the end."""
         while line := self._lines.readline():
             self.line_number += 1
-            if line.strip():
+            if line.strip(blanks):
                 self.is_whole = line.endswith(b"\n")
                 return line.removesuffix(b"\n")
         return b""
@@ -166,14 +166,14 @@ class MotionText:
         return ValueError(f"{self.path}, line {self.line_number}: {message}")
 
 
-def check_group(path, groups, group):
-    """Refuse a group of which a file has no members."""
+def check_group(path, groups, group, others=()):
+    """Refuse a group of which a file has no members; `others` counts what is in no group."""
     if group in groups and groups[group]["n"]:
         return
     there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
     raise ValueError(
         f"{path}: there are no {group[:40]} in this file; read_motion(..., group=...) reads "
-        f"{', '.join(there)[:300] or 'none'}."
+        f"{', '.join(there)[:300] or 'none'}{''.join(f', not its {x}s' for x in others)[:200]}."
     )
 
 
@@ -235,23 +235,23 @@ def split_fields(row, n=None):
     return fields
 
 
-def read_timed_rows(text, rows, time_column, what="time", unit="a number of seconds"):
+def read_timed_rows(text, rows, time_column, what="time"):
     """The numbers of each row, NaN where one is missing, and how many decimals the times have.
 
     `rows` yields the fields of one row after the other, as they are read from `text`. The column
-    may have the number of the frame in place of its time.
+    may have the number of the frame in place of its time, or None has neither.
     """
     result, decimals, before = [], 0, -math.inf
     for fields in rows:
-        numbers = _numbers_or_nan(text, fields)
-        time = numbers[time_column]
+        numbers = numbers_or_nan(text, fields)
+        time = 0.0 if time_column is None else numbers[time_column]
         if not -_LARGEST < time < _LARGEST or time < before:
             raise text.error(
-                f"the {what} of a row must be {unit}, and not lie before that of the row above, "
+                f"the {what} of a row must be a number, and not lie before that of the row above, "
                 f"got {time:g} after {before:g}."
             )
         before = time
-        decimals = max(decimals, _count_decimals(fields[time_column]))
+        decimals = max(decimals, _count_decimals(fields[time_column or 0]))
         result.append(numbers)
     if not result:
         raise text.error("the file ends where frames should follow; it is not complete.")
@@ -267,7 +267,7 @@ def read_rate(word):
     return rate if is_rate(rate) else None
 
 
-def _numbers_or_nan(text, fields):
+def numbers_or_nan(text, fields):
     try:
         numbers = array.array("d", map(float, fields))
         # Python accepts 1_0 as a number; no file means it.
@@ -364,6 +364,42 @@ def _common_prefix(names):
     landmarks = guess_landmarks(rest)
     known = {*landmarks.values(), *guess_feet(rest, landmarks).values()}
     return prefix if 2 * len(known) >= len(rest) else ""
+
+
+# -- contents beside the frames -----------------------------------------------------------------
+
+
+def describe_events(entries, rate, start):
+    """Events by time, of (label, context, time); `start` is the number of the first frame, from 0.
+
+    Each is a dict of its label, its context, its time in seconds of the trial, and its frame
+    in the recording, from 0; None where the frame rate is not known.
+    """
+    events = [
+        {
+            "label": label,
+            "context": context or None,
+            "time": time,
+            "frame": None if rate is None else round(time * rate - start, 5),
+        }
+        # The numbers of a C3D file have 24 bits.
+        for label, context, time in ((*texts, round(time, 6)) for *texts, time in entries)
+        if math.isfinite(time)
+    ]
+    return sorted(events, key=lambda event: event["time"])
+
+
+def describe_groups(groups, group, others):
+    """The contents of a file beside a group; `others` counts those that are in no group."""
+    contents = []
+    for name, facts in groups.items():
+        if name != group and facts["n"]:
+            noun = "analog channel" if name == "analog" else name.removesuffix("s")
+            rate = facts["frame_rate"] if name == "analog" else None
+            contents.append(
+                counted(facts["n"], noun) + ("" if rate is None else f" at {rate:g} Hz")
+            )
+    return contents + [counted(n, noun) for noun, n in others.items() if n]
 
 
 # -- MOT and STO -----------------------------------------------------------------------------------

@@ -30,10 +30,11 @@ WORDS = (
     *(b"Xposition Zrotation :units :root :bonedata :hierarchy begin end name root".split()),
     *(b"direction length axis dof rx tx order lfemur :DEGREES :RADIANS # ( )".split()),
     *(b"PathFileType DataRate NumFrames NumMarkers Units Frame# Time X1 Y2 Z time".split()),
+    *(b"Frame,Sub Trajectories Devices Model EVENT MARKER_NAMES Type,Bone Name ,,, deg".split()),
     *(b"endheader nRows=7 nColumns=9 inDegrees=yes DataType=Vec3 1,2,3 , \t \t\t\t".split(b" ")),
 )
 # Formats that may hold missing values.
-WITH_GAPS = ("c3d", "trc", "mot", "sto")
+WITH_GAPS = ("c3d", "trc", "mot", "sto", "vicon", "qtm", "motive")
 
 
 # -- damage -----------------------------------------------------------------------------
@@ -95,7 +96,7 @@ def set_value(rng, data):
 
 
 def split_words(data):
-    return re.split(rb"(\s+)", data)
+    return re.split(rb"([\s,]+)", data)
 
 
 def set_number(rng, data):
@@ -121,7 +122,7 @@ TEXT = (flip_bits, flip_bits, overwrite, truncate, repeat, repeat, move)
 TEXT += (set_number, set_number, set_word, set_word)
 # How files are damaged, by the ending of their names.
 DAMAGES = {".c3d": BINARY, ".npz": BINARY[:8] + ARCHIVE}
-DAMAGES |= dict.fromkeys((".bvh", ".amc", ".asf", ".trc", ".mot", ".sto"), TEXT)
+DAMAGES |= dict.fromkeys((".bvh", ".amc", ".asf", ".trc", ".mot", ".sto", ".csv", ".tsv"), TEXT)
 
 
 def damaged(originals, seed, number):

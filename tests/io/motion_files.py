@@ -275,6 +275,82 @@ def storage(values, labels, rate=100, times=None, header="version=1\nnRows={n}\n
     return text
 
 
+def cells(*rows, separator=","):
+    """Rows of text, of lists of cells or of arrays of numbers; NaN is a blank cell."""
+    lines = []
+    for row in rows:
+        many = np.ndim(row) == 2
+        for each in row if many else [row]:
+            texts = ["" if isinstance(x, float) and np.isnan(x) else str(x) for x in each]
+            lines.append(separator.join(texts))
+    return "\n".join(lines) + "\n"
+
+
+def vicon(title, rate, names, values, axes="XYZ", units="mm", first=1, per_frame=1, separator=","):
+    """A section of a CSV of Vicon Nexus, of values (n_rows, n_names * n_axes)."""
+    n = np.arange(len(values))
+    rows = [[first + k // per_frame, k % per_frame, *map(float, values[k])] for k in n]
+    spread = [x for name in names for x in [name, *[""] * (len(axes) - 1)]]
+    units = [units] * len(spread) if isinstance(units, str) else units
+    head = [["", "", *spread], ["Frame", "Sub Frame", *[*axes] * len(names)], ["", "", *units]]
+    return cells([title], [rate], *head, *rows, separator=separator)
+
+
+def qtm(names, values, columns=True, header=(), rate=100, contents="3D"):
+    """A TSV of QTM of values (n_frames, n_columns)."""
+    noun = "BODY" if contents == "6D" else "MARKER"
+    of = "BODIES" if contents == "6D" else "MARKERS"
+    head = {"NO_OF_FRAMES": len(values), "NO_OF_CAMERAS": 8, f"NO_OF_{of}": len(names)}
+    head |= {"FREQUENCY": rate, "NO_OF_ANALOG": 0, "DESCRIPTION": "--", "DATA_INCLUDED": contents}
+    rows = [[key, value] for key, value in (head | dict(header)).items()]
+    rows += [[f"{noun}_NAMES", *names]]
+    if columns:
+        rows += [["Frame", "Time", *(f"{name} {axis}" for name in names for axis in "XYZ")]]
+    for k, each in enumerate(values):
+        rows.append([*([k + 1, f"{k / rate:.5f}"] if columns else []), *map(float, each)])
+    return cells(*rows, separator="\t")
+
+
+def motive(columns, values, rate=120, parents=None, first=0, **facts):
+    """A CSV of Motive of values (n_frames, n_columns), by (type, name, id, what, axis) of each."""
+    facts = {"Format Version": "1.23", "Take Name": "T", "Capture Frame Rate": 2 * rate} | {
+        "Export Frame Rate": f"{rate:.6f}", "Total Exported Frames": len(values),
+        "Length Units": "Meters", "Coordinate Space": "Global",
+    } | facts  # fmt: skip
+    kinds, names, ids, what, axes = zip(*columns, strict=True)
+    rows = [[x for fact in facts.items() for x in fact], [], ["", "Type", *kinds]]
+    rows += [["", "Name", *names], ["", "ID", *(f'"{x}"' for x in ids)]]
+    rows += [["", "Parent", *(f'"{x}"' for x in parents)]] if parents else []
+    rows += [["", "", *what], ["Frame", "Time (Seconds)", *axes]]
+    for k, each in enumerate(values, first):
+        rows.append([k, f"{k / rate:.6f}", *map(float, each)])
+    return cells(*rows)
+
+
+def part(kind, name, mark, turns=True):
+    """The columns of a bone, a rigid body or a marker in a CSV of Motive."""
+    rotation = [(kind, name, mark, "Rotation", axis) for axis in "XYZW"] if turns else []
+    return rotation + [(kind, name, mark, "Position", axis) for axis in "XYZ"]
+
+
+def nexus():
+    """A CSV of Vicon Nexus with events, model outputs, trajectories and devices."""
+    rng, columns = np.random.default_rng(0), ["Ann:LKneeAngles", "Ann:LHipMoment"]
+    events = cells(
+        ["Events"], [100], ["Subject", "Context", "Name", "Time (s)", "Description"],
+        ["Ann", "Right", "Foot Strike", 1.23, "heel"], ["Ann", "Left", "Foot Off", 1.1, "x"], [""],
+        ["Gait Cycle Parameters"], ["Subject", "Context", "Name", "Value", "Units"],
+        ["Ann", "Left", "Cadence", 110, "steps/min"],
+    )  # fmt: skip
+    values = rng.integers(-900, 900, (3, 20, 6)) / 8
+    units = ["deg"] * 3 + ["N.mm/kg"] * 3
+    outputs = vicon("Model Outputs", 100, columns, values[0], units=units, first=101)
+    markers = vicon("Trajectories", 100, ["Ann:LASI", "Ann:RASI"], values[1], first=101)
+    forces = rng.integers(-900, 900, (80, 2)) / 8
+    devices = vicon("Devices", 400, ["Plate 1 - Force"], forces, ["Fx", "EMG"], ["N", "V"], 101, 4)
+    return "\n".join([events, outputs, markers, devices]), values, forces
+
+
 VECTORS, VEC3 = [["1,2,3", "~[4,5,6]"]] * 20, "DataType=Vec3\nDataRate=100\n"
 # For each format a function that returns the files of a small example, {name: bytes}, the first of
 # which is read.
@@ -285,4 +361,21 @@ EXAMPLES = {
     "trc": lambda: {"a.trc": trc(tracks(gap=(3, 9)), ["LASI", "R Knee", "V_Sacral"]).encode()},
     "mot": lambda: {"a.mot": storage([[1.5, -2], [2, 0]] * 9, ["knee", "force_vx"]).encode()},
     "sto": lambda: {"a.sto": storage(VECTORS, ["pelvis", "torso"], header=VEC3).encode()},
+    "vicon": lambda: {"a.csv": nexus()[0].encode()},
+    "qtm": lambda: {
+        "a.tsv": qtm(
+            ["LASI", "R Knee"],
+            tracks()[:, :2].reshape(40, 6),
+            header={"EVENT": "Step\t11\t0.10000", "TIME_STAMP": "2026-01-19, 10:19:43.755\t20.5"},
+        ).encode()
+    },
+    "motive": lambda: {
+        "a.csv": motive(
+            part("Bone", "S:Hip", 1)
+            + part("Bone", "S:LThigh", 2)
+            + part("Marker", "S:HTop", 3, False),
+            np.random.default_rng(0).integers(-9, 9, (20, 17)) / 8,
+            parents=[0] * 7 + [1] * 7 + [""] * 3,
+        ).encode()
+    },
 }

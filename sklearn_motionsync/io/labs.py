@@ -1,0 +1,357 @@
+"""Text exports of optical laboratories: Vicon Nexus, Qualisys QTM and OptiTrack Motive."""
+
+import itertools
+import math
+import operator
+import re
+from collections import Counter
+
+import numpy as np
+
+from ..body.skeleton import find_cycle
+from ..inputs.wording import counted
+from .text import (
+    MotionText,
+    check_group,
+    decode,
+    describe_events,
+    describe_groups,
+    hide_unseen,
+    make_unique,
+    numbers_or_nan,
+    quote,
+    read_rate,
+    read_timed_rows,
+    split_fields,
+    split_subjects,
+)
+
+
+def _cells(row, separator=b","):
+    return [cell.strip().strip(b'"').strip() for cell in row.split(separator)]
+
+
+def _read_columns(text, rows, columns, n, time_column, separator=b",", what="time"):
+    """The numbers in columns of `n`, NaN where a cell is blank, and the decimals of the times."""
+    pick = operator.itemgetter(*columns)
+
+    def picked():
+        for row in rows:
+            cells = row.split(separator)
+            missing = n - len(cells)
+            if missing > 0 and missing % 3 == 0 and text.is_whole:
+                cells += [b""] * missing  # of markers at its end
+            elif missing > 0 or b"".join(cells[n:]).strip():
+                got = f"{len(cells)} ({quote([row])})"
+                raise text.error(f"a row needs {counted(n, 'cell')}, got {got}.")
+            yield pick(cells)
+
+    frames, decimals = read_timed_rows(text, picked(), time_column, what)
+    return np.frombuffer(b"".join(frames)).reshape(len(frames), -1).copy(), decimals
+
+
+def _as_positions(names, values, known=None):
+    joints, subjects = split_subjects(names, known)
+    positions = values.reshape(len(values), len(joints), -1)[:, :, :3].copy()
+    facts = {"joints": joints, "subjects": subjects, "parents": [-1] * len(joints)}
+    return facts | {"positions": positions}
+
+
+# -- Vicon Nexus: sections below each other, each with its rate, names, axes, units and rows -------
+
+VICON = re.compile(
+    rb'(?im)^"?(?:frame"? *[,;\t] *"?sub ?frame|(?:model outputs|trajectories|devices|joints|'
+    rb'segments|events|gait cycle parameters)"?[,;\t ]*\r?\n"?(?:\d|subject))'
+)
+_AXES_ROW = re.compile(rb'(?i)"?(?:frame|field ?#)"? *([,;\t])')
+# Model outputs by their unit; where it is blank, their names end so.
+_OUTPUTS = {
+    "angles": "deg|rad",
+    "forces": "k?n(/kg)?",
+    "moments": "k?n[.*]?m?m(/kg)?",
+    "powers": "m?w(/kg)?",
+    "positions": "mm|cm|m",
+}
+# No device is so much faster than the cameras.
+_MOST_SUB_FRAMES = 10000
+
+
+def read_vicon(path, *, group="markers"):
+    """A CSV of Vicon Nexus as a reader of `motion.FORMATS` returns it; blank cells are NaN.
+
+    `group` is "markers", "analog" (or "devices"), or what the model outputs are, such as "angles".
+    """
+    group = "analog" if group == "devices" else group
+    text = MotionText(path)
+    sections, separator = _read_sections(text)
+    members, entries, others = {}, [], Counter()
+    for title, lines in sections:
+        at = next((i for i, (*_, line) in enumerate(lines) if _AXES_ROW.match(line)), None)
+        if at is not None:
+            head = [_cells(line, separator) for *_, line in lines[: at + 2]]
+            names, axes, units = head[at - 1] if at else [], head[at], head[-1]
+            units = [] if units[0] or units is axes else units
+            table = read_rate(head[0][0]) if at > 1 else None, axes, lines[at + 1 + bool(units) :]
+            for kind, found in _sort_columns(title.lower(), names, axes, units, others).items():
+                number = sum(key.partition("_")[0] == kind for key in members) + 1
+                members[kind if number == 1 else f"{kind}_{number}"] = (table, found)
+        elif title.lower() == "events":
+            entries += _read_events(text, lines, separator)
+        elif lines:
+            others[f"section {title[:40]!r}"] += 1
+    groups = {}
+    for name, ((rate, *_), of) in members.items():
+        units = [unit for *_, unit in of]
+        same = units[0] if len(set(units)) == 1 else None
+        units = units if name.startswith("analog") else same
+        groups[name] = {"n": len(of), "units": units, "frame_rate": rate}
+    check_group(path, groups, group)
+    (rate, axes, lines), of = members[group]
+    columns = [j for _, at, _ in of for j in at]
+    n_first = 1 + axes[1].lower().startswith(b"sub")
+    text.check_size(len(lines), len(columns) // 3 + 1)
+    rows = (line for text.line_number, text.is_whole, line in lines)
+    columns = [*range(n_first), *columns]
+    values, _ = _read_columns(text, rows, columns, len(axes), 0, separator, "frame")
+    times = _read_times(text, values[:, :n_first], rate)
+    facts = {
+        "frame_rate": rate, "units": groups[group]["units"], "up": None, "kind": group,
+        "events": describe_events(entries, rate, times[0] * (rate or 1)),
+        "first_frame": int(values[0, 0]), "groups": groups,
+        "left_out": ", ".join(describe_groups(groups, group, others)),
+    }  # fmt: skip
+    if rate is not None:
+        facts |= {"times": times, "decimals": 17}
+    names, values = [name for name, *_ in of], values[:, n_first:]
+    if any(len(at) != 3 for _, at, _ in of):
+        names = [f"{x}_{decode(axes[j]).lower()}" if at[1:] else x for x, at, _ in of for j in at]
+        return facts | {"channels": make_unique(names), "values": values}
+    # An output of a model is of a subject by the names of the markers.
+    known = [x for key, (_, of) in members.items() if not key.startswith("analog") for x, *_ in of]
+    facts |= _as_positions(names, values, known)
+    if group.startswith("markers"):
+        hide_unseen(facts["positions"])
+    return facts
+
+
+def _read_sections(text):
+    """Titles, each with its lines (number, whether it is whole, text), and what separates cells."""
+    sections, lines = [], []
+    while line := text.row():
+        lines.append((text.line_number, text.is_whole, line))
+    separator = next((found[1] for *_, x in lines if (found := _AXES_ROW.match(x))), None)
+    if separator is None:
+        raise ValueError(
+            f"{text.path}: there is no row 'Frame,Sub Frame,X,Y,Z', as Vicon Nexus writes it, and "
+            "no other known format is like this file."
+        )
+    for number, is_whole, line in lines:
+        # With semicolons numbers have decimal commas.
+        line = line.replace(b",", b".") if separator == b";" else line
+        cells = [b"0"] if line[:1].isdigit() else _cells(line, separator)
+        if cells[0] and not cells[0][:1].isdigit() and not any(cells[1:]):
+            sections.append((decode(cells[0]), []))
+        elif sections and any(cells):
+            sections[-1][1].append((number, is_whole, line))
+    return sections, separator
+
+
+def _read_events(text, lines, separator):
+    """(label, context, time) of each row below a header, which names the columns."""
+    events, keys = [], None
+    for text.line_number, _, line in lines:
+        cells = _cells(line, separator)
+        if b"context" in (cell.lower() for cell in cells):
+            keys = [cell.lower().partition(b" ")[0] for cell in cells]
+        elif keys is not None:
+            event = dict.fromkeys((b"name", b"context", b"time"), b"")
+            event |= dict(zip(keys, cells, strict=False))
+            (time,) = numbers_or_nan(text, [event[b"time"]])
+            events.append((decode(event[b"name"]), decode(event[b"context"]), time))
+    return events
+
+
+def _sort_columns(title, names, axes, units, others):
+    """(name, columns, unit) of the members of each group; `others` counts what is in none."""
+    while len(axes) > 2 and not axes[-1]:
+        axes.pop()
+    names, units = (list(map(decode, x + [b""] * len(axes))) for x in (names, units))
+    found, groups = [], {}
+    for j in range(1 + axes[1].lower().startswith(b"sub"), len(axes)):
+        # A name reaches to the next.
+        if names[j] or not found:
+            found.append((names[j] or f"marker_{j}", {}))
+        axis = decode(axes[j])
+        if title == "devices":
+            # Channels of several force plates have the same names.
+            name = f"{found[-1][0]} {axis}" if axes.count(axes[j]) > 1 or not axis else axis
+            groups.setdefault("analog", []).append((name.strip(), [j], units[j] or None))
+        else:
+            found[-1][1].setdefault(axis.lower(), j)
+    for name, at in found if title != "devices" else ():
+        turns = any(axis[:1] == "r" for axis in at)
+        others["rotation"] += turns
+        axes_of = next((x for x in (["x", "y", "z"], ["tx", "ty", "tz"]) if {*x} <= {*at}), None)
+        unit = units[at[axes_of[0]] if axes_of else next(iter(at.values()))] or None
+        if axes_of:
+            kind = "segments" if "tx" in axes_of else _kind_of(title, name, unit)
+            groups.setdefault(kind, []).append((name, [at[axis] for axis in axes_of], unit))
+        elif not turns:
+            groups.setdefault("scalars", []).append((name, list(at.values()), unit))
+    return groups
+
+
+def _kind_of(title, name, unit):
+    if title == "trajectories":
+        return "markers"
+    for kind, units in _OUTPUTS.items():
+        ends_so = unit is None and name.lower().removesuffix("s").endswith(kind[:-1])
+        if ends_so or (unit and re.fullmatch(units, unit.lower())):
+            return kind
+    return "scalars"
+
+
+def _read_times(text, numbers, rate):
+    """Seconds of the trial, whose frame 1 is at 0, by the numbers of frames and sub-frames."""
+    sub = numbers[:, 1] if numbers.shape[1] == 2 else np.zeros(len(numbers))
+    per_frame = np.floor(sub.max()) + 1
+    times = ((numbers[:, 0] - 1) * per_frame + sub) / (rate or 1)
+    if not (sub.min() >= 0 and per_frame <= _MOST_SUB_FRAMES and (np.diff(times) >= 0).all()):
+        raise text.error(
+            f"the Sub Frames of a frame must count from 0 to {_MOST_SUB_FRAMES} at most, got "
+            f"{sub.min():g} to {sub.max():g}, or not in order."
+        )
+    return times
+
+
+# -- Qualisys QTM: a header of names and values, and columns of markers or bodies ------------------
+
+QTM = re.compile(rb"(?:NO_OF_[A-Z]+|FREQUENCY|TIME_STAMP|DATA_INCLUDED)\s")
+_KEY = re.compile(rb"(NO_OF|DATA)_\w+|\w*FREQUENCY|DESCRIPTION|TIME_STAMP|\w+_(NAMES|TYPES)|EVENT")
+# Keys, noun and numbers of columns of a marker; or of a body, which has a position, three angles, a
+# residual and perhaps a matrix.
+_CONTENTS = {
+    b"3D": (b"MARKER_NAMES", b"NO_OF_MARKERS", "marker", (3,)),
+    b"6D": (b"BODY_NAMES", b"NO_OF_BODIES", "body", (16, 7)),
+}
+
+
+def read_qtm(path):
+    """A TSV of QTM as a reader of `motion.FORMATS` returns it; blank cells and 0 0 0 are NaN."""
+    text = MotionText(path)
+    header, marks, row = {}, [], text.row()
+    while (fields := split_fields(row, 0)) and _KEY.fullmatch(fields[0]):
+        header[fields[0]] = fields[1:]
+        marks += [(fields + [b""] * 3)[1:4]] * (fields[0] == b"EVENT")
+        row = text.row(b"\n")
+    contents = b" ".join(header.get(b"DATA_INCLUDED", [b"3D"]))
+    key, number, noun, widths = _CONTENTS.get(contents, (b"",) * 4)
+    names = [decode(name) for name in header.get(key, [])]
+    if not names:
+        raise text.error(
+            "expected DATA_INCLUDED 3D with MARKER_NAMES, or 6D with BODY_NAMES, got "
+            f"{quote([contents])} and {quote(list(header))}."
+        )
+    leads, n = (2, 0), len(names)
+    if fields and not any(re.match(rb"[-+.\d]", field) for field in fields):
+        # The names of the columns.
+        leads = (sum(field.lower() in (b"frame", b"time") for field in fields[:2]),)
+        row = text.row(b"\n")
+    sizes = [(lead, lead + n * width) for lead in leads for width in widths]
+    fitting = [(lead, size) for lead, size in sizes if len(split_fields(row, size)) == size]
+    if not fitting or 1 in leads:
+        raise text.error(
+            f"{decode(key)} names {n}, each with {' or '.join(map(str, widths))} columns, behind "
+            f"Frame and Time or without both; got {len(split_fields(row))} columns."
+        )
+    lead, size = fitting[0]
+    rows = itertools.chain([row], iter(lambda: text.row(None if lead else b"\n"), b""))
+    values, decimals = _read_columns(text, rows, range(size), size, 1 if lead else None, b"\t")
+    for of, stated, what in ((len(values), b"NO_OF_FRAMES", "frame"), (n, number, noun)):
+        if stated in header:
+            word = b" ".join(header[stated])
+            text.check_count(of, text.count(word, decode(stated)), decode(stated), what)
+    rate, entries = read_rate(b" ".join(header.get(b"FREQUENCY", []))), []
+    for label, *at in marks:
+        frame, time = numbers_or_nan(text, at)
+        entries.append((decode(label), "", (frame - 1) / (rate or 1) if math.isnan(time) else time))
+    facts = _as_positions(names, values[:, lead:])
+    hide_unseen(facts["positions"])
+    if lead:
+        facts |= {"times": values[:, 1].copy(), "decimals": decimals}
+    start = values[0, 1] * (rate or 1) if lead else 0.0
+    return facts | {
+        "frame_rate": rate, "units": "mm", "up": None,
+        "kind": "markers" if noun == "marker" else "joints",
+        "first_frame": int(values[0, 0]) if lead and math.isfinite(values[0, 0]) else 1,
+        "events": describe_events(entries, rate, start),
+        "left_out": "" if noun == "marker" else counted(n, "rotation"),
+    }  # fmt: skip
+
+
+# -- OptiTrack Motive: a line of facts, and columns with a type, a name, an axis and others --------
+
+_LENGTHS = {b"meters": "m", b"centimeters": "cm", b"millimeters": "mm", b"inches": "in"}
+_GROUPS = {"bone": "joints", "rigid body": "joints", "marker": "markers"}
+
+
+def read_motive(path, *, group=None):
+    """A CSV of Motive as a reader of `motion.FORMATS` returns it.
+
+    `group` is "joints" (bones and rigid bodies), by default if there are any, or "markers".
+    """
+    text = MotionText(path)
+    facts, table = dict(itertools.pairwise(_cells(text.row()))), {}
+    while (row := text.row()) and not _AXES_ROW.match(row):
+        cells = _cells(row)
+        table[b"".join(cells[:2]).lower()] = cells
+    axes = _cells(row.lower())
+    if b"name" not in table or not b"".join(axes[1:2]).startswith(b"time"):
+        raise text.error("expected rows of Type, Name, ID and 'Frame,Time (Seconds),X,Y,Z'.")
+    keys = (b"type", b"name", b"id", b"parent", b"")
+    rows = [list(map(decode, table.get(key, []) + [b""] * len(axes))) for key in keys]
+    members, others = {"joints": [], "markers": []}, Counter()
+    for j, (kind, name, mark, parent, what) in enumerate(zip(*rows, strict=False)):
+        others["rotation"] += (what.lower(), axes[j : j + 1]) == ("rotation", [b"x"])
+        if what.lower() == "position" and axes[j : j + 3] == [b"x", b"y", b"z"]:
+            kind = f"unlabelled {kind}" if name.lower().startswith("unlabel") else kind
+            if of := _GROUPS.get(kind.lower()):
+                members[of].append((name or f"{kind}_{j}", j, mark, parent))
+            else:
+                others[kind.lower()[:40]] += 1
+    rate = read_rate(facts.get(b"Export Frame Rate", facts.get(b"Capture Frame Rate", b"")))
+    units = facts.get(b"Length Units", b"")
+    units = _LENGTHS.get(units.lower(), decode(units) or None)
+    groups = {of: {"n": len(x), "units": units, "frame_rate": rate} for of, x in members.items()}
+    group = group or ("joints" if members["joints"] else "markers")
+    check_group(path, groups, group, [noun for noun, n in others.items() if n])
+    if group == "joints" and facts.get(b"Coordinate Space", b"").lower() == b"local":
+        raise text.error("positions are those in the parent bone; export them as Global.")
+    names, columns, _, _ = zip(*members[group], strict=True)
+    columns = [0, 1, *(j + k for j in columns for k in range(3))]
+    values, decimals = _read_columns(text, iter(text.row, b""), columns, len(axes), 1)
+    stated = facts.get(b"Total Exported Frames", b"")
+    n_stated = int(stated) if stated.isdigit() else None
+    text.check_count(len(values), n_stated, "Total Exported Frames")
+    known = [name for of in members.values() for name, *_ in of]
+    motion = _as_positions(names, values[:, 2:], known)
+    return motion | {
+        "parents": _read_parents(text, members[group], motion["subjects"]),
+        "times": values[:, 1].copy(), "decimals": decimals, "frame_rate": rate,
+        "units": units, "up": "y", "kind": group, "groups": groups,
+        "first_frame": int(values[0, 0]) if math.isfinite(values[0, 0]) else None,
+        "left_out": ", ".join(describe_groups(groups, group, others)),
+    }  # fmt: skip
+
+
+def _read_parents(text, members, subjects):
+    """The index of each bone's parent, which its row names by ID or name."""
+    at = {name: j for j, (name, *_) in enumerate(members)}
+    at |= {(subjects[j], name.rpartition(":")[2]): j for j, (name, *_) in enumerate(members)}
+    at |= {(subjects[j], mark): j for j, (_, _, mark, _) in enumerate(members) if mark}
+    words = [(subjects[j], parent) for j, (*_, parent) in enumerate(members)]
+    parents = [at.get(word, at.get(word[1], -1)) for word in words]
+    parents = [-1 if parent == j else parent for j, parent in enumerate(parents)]
+    if find_cycle(parents):
+        raise text.error("the row of parents has a bone that is below itself.")
+    return parents
