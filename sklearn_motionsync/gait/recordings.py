@@ -12,7 +12,7 @@ from ..body.landmarks import as_tuple, guess_feet
 from ..body.skeleton import Skeleton, check_columns
 from ..inputs.collections import as_collection, check_members
 from ..inputs.numbers import nanmean
-from ..inputs.recorded import frames_of_rows, start_of_rows
+from ..inputs.recorded import frames_of_rows, rows_at, times_of_rows
 from ..inputs.tables import as_pandas, index_of
 from ..inputs.trial_facts import TrialFacts
 from ..inputs.wording import counted, within
@@ -108,11 +108,11 @@ class Recordings:
 
     def times_at(self, i, rows):
         """Seconds at rows of a recording."""
-        return start_of_rows(self._given[i]) + np.asarray(rows, dtype=np.float64) / self._rates[i]
+        return times_of_rows(self._given[i], rows, self._rates[i])
 
     def row_of_time(self, i, time):
         """The inverse of `times_at`."""
-        return (time - start_of_rows(self._given[i])) * self._rates[i]
+        return rows_at(self._given[i], time, self._rates[i])
 
     def split_events(self, events):
         """The events of a table, by recording: label, side and row; None of each without a table.

@@ -12,7 +12,14 @@ import pandas as pd
 from .collections import NOT_ONE, as_collection, check_members
 from .facts import TIMELESS, compare_facts
 from .numbers import refuse_non_numeric
-from .recorded import CLOCK, Recorded, frame_rate_of_rows, warn_of_rows
+from .recorded import (
+    CLOCK,
+    Recorded,
+    frame_rate_of_rows,
+    set_clock_of_index,
+    times_of_rows,
+    warn_of_rows,
+)
 from .resampling import (
     even_grid,
     find_time_gaps,
@@ -344,6 +351,7 @@ def _split_by_columns(df, by, time, frame_rate, max_gap_time):
         attrs = recording.attrs_of(rows, times, grid) | {"resampled": grid is not None}
         attrs[CLOCK] = _clock(times if grid is None else grid)
         sequences.append(labelled(x, label, (*names, time), attrs))
+        set_clock_of_index(sequences[-1])
     return sequences
 
 
@@ -357,7 +365,7 @@ def _at_rate(x, frame_rate):
             f"{counted(len(x), 'row')} with the index {x.index.name!r} have none."
         )
     time = next(name for name in ("time", "time_s", "seconds") if name not in x.columns)
-    timed = x.assign(**{time: np.arange(len(x)) / rate})
+    timed = x.assign(**{time: times_of_rows(x, np.arange(len(x)), rate)})
     return to_trials(timed, time=time, frame_rate=frame_rate)[0]
 
 

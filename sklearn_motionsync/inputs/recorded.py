@@ -12,6 +12,7 @@ from numbers import Real
 import numpy as np
 import pandas as pd
 
+from ..matching.counting import whole
 from .resampling import is_even, is_rate, rounded_rate, times_as_numbers
 from .tables import FRAME, split_table
 
@@ -19,6 +20,7 @@ __all__ = [
     "CLOCK",
     "SAME_RATE",
     "Recorded",
+    "first_time_of",
     "frame_rate_of_rows",
     "frames_of_rows",
     "is_thinned",
@@ -26,8 +28,10 @@ __all__ = [
     "recorded_frames",
     "refuse_moved_events",
     "refuse_seconds",
-    "start_of_rows",
+    "rows_at",
+    "set_clock_of_index",
     "timeless",
+    "times_of_rows",
     "warn_of_rows",
 ]
 
@@ -106,15 +110,52 @@ def frame_rate_of_rows(x):
     return float(rate / steps[0]) if len(steps) else float(rate)
 
 
-def start_of_rows(x):
+def times_of_rows(x, rows, frame_rate):
+    """Seconds at rows of a trial, with fractions, on the clock of its recording and its events."""
+    return _start_of_rows(x) + np.asarray(rows, dtype=np.float64) / frame_rate
+
+
+def rows_at(x, times, frame_rate):
+    """The inverse of `times_of_rows`."""
+    return (times - _start_of_rows(x)) * frame_rate
+
+
+def _start_of_rows(x):
     """The time of the first row of a table in seconds, by its index or ``attrs``; 0 if unknown."""
     if not isinstance(x, pd.DataFrame) or not len(x):
         return 0.0
     if _rate_of_seconds(_frame_level(x)) is not None:
         return float(times_as_numbers(_frame_level(x), "The index")[0])
-    start, rate, frames = x.attrs.get("first_time"), x.attrs.get("frame_rate"), recorded_frames(x)
-    start = float(start) if isinstance(start, Real) else 0.0
+    start, rate = first_time_of(x.attrs) or 0.0, x.attrs.get("frame_rate")
+    frames = recorded_frames(x)
     return start if frames is None or not is_rate(rate) else start + float(frames[0] / rate)
+
+
+def set_clock_of_index(x):
+    """Move first time and events in ``attrs`` of a trial to the clock of its index in seconds."""
+    if (rate := _rate_of_seconds(_frame_level(x))) is None:
+        return
+    start = _start_of_rows(x)
+    x.attrs |= {"first_time": start} if "first_time" in x.attrs else {}
+    for i, event in enumerate(x.attrs.get("events", ())):
+        if _frame_of(event) is not None and "time" in event:
+            time = round(start + event["frame"] / rate, 6)
+            x.attrs["events"][i] = event | {"time": time}
+
+
+def first_time_of(attrs):
+    """The time of frame 0 of a recording, perhaps by its number, of which 1 is at 0 seconds."""
+    time, number, rate = map(attrs.get, ("first_time", "first_frame", "frame_rate"))
+    if time is None and isinstance(number, int) and is_rate(rate):
+        time = max(number - 1, 0) * _rows_per_frame(attrs) / rate
+    return float(time) if isinstance(time, Real) else None
+
+
+def _rows_per_frame(attrs):
+    """Analog channels have several rows in a frame of the trial."""
+    groups = attrs.get("groups", {})
+    rates = [groups.get(group, {}).get("frame_rate") for group in ("analog", "markers")]
+    return rates[0] / rates[1] if attrs.get("kind") == "analog" and all(rates) else 1
 
 
 def names_seconds(name):
@@ -276,10 +317,12 @@ class Recorded:
             return facts | {"frame_rate": index_rate} if has_rate else facts
         frames = self.frames[rows]
         first, all_rows = int(frames[0]), len(rows) == self._n_rows
-        start, seconds, events = map(self._attrs.get, ("first_time", "times", "events"))
-        for key, still in (("first_frame", first == 0), ("rows", first == 0 and all_rows)):
-            if still and key in self._attrs:
-                facts[key] = self._attrs[key]
+        start, seconds = first_time_of(self._attrs), self._attrs.get("times")
+        events, number = map(self._attrs.get, ("events", "first_frame"))
+        if first == 0 and all_rows and "rows" in self._attrs:
+            facts["rows"] = self._attrs["rows"]
+        if isinstance(number, int):
+            facts["first_frame"] = number + whole(first / _rows_per_frame(self._attrs), "down")
         if start is not None and (is_rate(rate) or first == 0):
             facts["first_time"] = start + (first / rate if first else 0)
         if seconds is not None and frames.max() < len(seconds):

@@ -19,16 +19,17 @@ def read_acclaim(path, *, asf=None):
     asf = find_asf(path) if asf is None else Path(asf)
     bones, length_unit, in_degrees = read_asf(asf)
     text = MotionText(path)
-    values, degrees, frame_rate = _read_amc(text, bones, in_degrees, asf)
+    values, header = _read_amc(text, bones, in_degrees, asf)
     text.check_size(len(values), len(bones))
-    positions = _place_bones(bones, in_degrees, values, degrees)
+    positions = _place_bones(bones, in_degrees, values, header["degrees"])
     positions /= length_unit
     positions *= _METRES_PER_INCH
     return {
         "joints": [bone.name for bone in bones],
         "parents": [bone.parent for bone in bones],
         "positions": positions,
-        "frame_rate": frame_rate,
+        "frame_rate": header["frame_rate"],
+        "first_frame": header["first_frame"],
         "units": "m",
         "up": "y",
         "kind": "joints",
@@ -194,7 +195,7 @@ def _connect(text, bones, parents):
 
 
 def _read_amc(text, bones, in_degrees, asf):
-    """Values (n_frames, n_dofs) in the order of the bones, whether in degrees, and frame rate."""
+    """Values (n_frames, n_dofs) in the order of the bones, and what else the file tells."""
     n_dofs = {bone.name: len(bone.dofs) for bone in bones}
     moving = [name for name, n in n_dofs.items() if n]
     header = {"degrees": in_degrees, "frame_rate": None}
@@ -211,7 +212,8 @@ def _read_amc(text, bones, in_degrees, asf):
         n_frames += 1
     if not n_frames:
         raise text.error("the file ends without a frame; each begins with its number.")
-    return np.frombuffer(values).reshape(n_frames, -1), header["degrees"], header["frame_rate"]
+    header["first_frame"] = number - n_frames + 1
+    return np.frombuffer(values).reshape(n_frames, -1), header
 
 
 def _frames(text, n_dofs, header, asf):

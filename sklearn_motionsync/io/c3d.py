@@ -54,7 +54,9 @@ def read_c3d(path, *, group="markers"):
         }
     check_group(file.path, groups, group)
     first_frame = _read_first_frame(file, parameters)
-    events, n_untimed = _read_events(file, parameters, rate, first_frame)
+    # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
+    start = max(first_frame - 1, 0)
+    events, n_untimed = _read_events(file, parameters, rate, start)
     facts = {
         "frame_rate": groups[group]["frame_rate"],
         "units": groups[group]["units"],
@@ -411,10 +413,12 @@ def _read_first_frame(file, parameters):
     return int(start[0]) + (65536 * int(start[1]) if len(start) > 1 else 0)
 
 
-def _read_events(file, parameters, rate, first_frame):
-    """Events by time, and the number of those without a time."""
-    # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
-    start = max(first_frame - 1, 0)
+def _read_events(file, parameters, rate, start):
+    """Events by time, and the number of those without a time.
+
+    Each is a dict of its label, its context, its time in seconds of the trial, and its frame
+    in the recording, from 0; None where the frame rate is not known.
+    """
     entries = _read_event_parameters(parameters)
     if entries is None:
         entries = _read_header_events(file, 0.0 if rate is None else start / rate)

@@ -18,7 +18,7 @@ from ..inputs.recorded import (
     frames_of_rows,
     names_seconds,
     refuse_moved_events,
-    start_of_rows,
+    times_of_rows,
 )
 from ..inputs.tables import (
     FRAME,
@@ -184,7 +184,8 @@ def _read_events(df, name):
     if not placed:
         raise ValueError(
             f"{name}: its events have no frames, as its file has no frame rate. Set them: "
-            "event['frame'] = event['time'] * rate, for each of df.attrs['events']."
+            "event['frame'] = (event['time'] - seconds of frame 0) * rate, for each of "
+            "df.attrs['events']."
         )
     return sorted(placed, key=lambda event: event["frame"])
 
@@ -287,19 +288,8 @@ def _cut(df, recording, rows, events):
         for event in events
         if first < event["frame"] < last
     ]
-    if isinstance(number := df.attrs.get("first_frame"), int):
-        attrs["first_frame"] = number + whole(first / _rows_per_frame(attrs), "down")
     trial.attrs = attrs
     return trial
-
-
-def _rows_per_frame(attrs):
-    """Analog channels have several rows in a frame of the trial."""
-    groups = attrs.get("groups", {})
-    rates = [groups.get(group, {}).get("frame_rate") for group in ("analog", "markers")]
-    if attrs.get("kind") != "analog" or not all(rates):
-        return 1
-    return rates[0] / rates[1]
 
 
 # -- key-frames ----------------------------------------------------------------------------
@@ -403,7 +393,7 @@ def keyframes_from_events(
     clocks = [frames_of_rows(x) for x in sequences]
     if in_seconds:
         clocks = [
-            start_of_rows(x) + np.arange(len(x)) / rate
+            times_of_rows(x, np.arange(len(x)), rate)
             for x, rate in zip(sequences, rates, strict=True)
         ]
     columns = _Columns(names)

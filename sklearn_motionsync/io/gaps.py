@@ -172,8 +172,6 @@ def _trim(df, missing):
         return part
     part = part.set_axis(pd.RangeIndex(len(rows), name=df.index.name))
     part.attrs = recording.attrs_of(rows) | {"rows": [first, last]}
-    if isinstance(number := df.attrs.get("first_frame"), int):
-        part.attrs["first_frame"] = number + first
     return part
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.numbers import LARGEST, listed
-from ..inputs.recorded import SAME_RATE, is_thinned
+from ..inputs.recorded import SAME_RATE, first_time_of, is_thinned
 from ..inputs.resampling import is_even, is_rate
 from ..inputs.tables import FRAME
 from ..inputs.types import Path
@@ -231,8 +231,8 @@ def read_motion(
             decimals=motion.pop("decimals"),
             frame_rate=frame_rate,
         )
-    elif frame_rate is not None:
-        motion["frame_rate"] = float(frame_rate)
+    else:
+        _set_clock(motion, frame_rate)
     df = _to_frame(motion, path, known)
     if max_gap or ends != "keep":
         df = fill_gaps(df, max_gap, ends=ends)
@@ -242,6 +242,21 @@ def read_motion(
     warn_of_gaps(df, path.name)
     is_wanted = quality == "keep" and confidence is not None
     return _with_confidence(df, confidence) if is_wanted else df
+
+
+def _set_clock(motion, frame_rate):
+    """The frame rate of frames without times, and with it the time of the first and of events.
+
+    Frames are what a file counts. At another rate they are at other times.
+    """
+    if frame_rate is not None:
+        motion["frame_rate"] = float(frame_rate)
+    if (rate := motion["frame_rate"]) is None:
+        return
+    motion["first_time"] = first_time_of(motion) or 0.0
+    for event in motion.get("events", ()):
+        if frame_rate is not None and event["frame"] is not None:
+            event["time"] = round(motion["first_time"] + event["frame"] / rate, 6)
 
 
 def check_confidence(min_confidence):
@@ -465,7 +480,7 @@ def describe_times(
 ):
     """The ``attrs`` of a recording that describe its times, which do not decrease.
 
-    ``frame_rate`` (None if it is not known), ``first_time`` where times are in seconds, ``times``
+    ``frame_rate`` (None if it is not known), ``first_time`` where seconds are known, ``times``
     where they are uneven. A rate that the file states counts where the times agree with it, as far
     as the ``decimals`` that they were written with allow. A ``frame_rate`` of the caller replaces
     all others. Times in frames give no frame rate. With ``may_be_thinned`` every k-th frame of the
@@ -476,8 +491,8 @@ def describe_times(
     """
     rate, even = _estimate_frame_rate(times, decimals, stated)
     facts = {"frame_rate": rate if unit == "s" else None}
-    if unit == "s":
-        facts["first_time"] = float(times[0])
+    if unit == "s" or frame_rate is not None:
+        facts["first_time"] = float(times[0] / (1 if unit == "s" else frame_rate))
     if not even:
         facts["times"] = times.tolist()
     if frame_rate is not None:

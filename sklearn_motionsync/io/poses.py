@@ -55,7 +55,7 @@ def from_poses(
         Their ``attrs`` have the keys of `read_motion`: ``format`` ("poses"), ``frame_rate``
         (frames per second; None if it is not known, or times are uneven), ``units`` (None), ``up``
         ("-y" in the plane, as y points down in pictures; None in space), ``kind`` ("keypoints"),
-        ``joints``, ``parents`` (-1 for all), ``first_time`` (seconds) if times are in seconds,
+        ``joints``, ``parents`` (-1 for all), ``first_time`` (seconds) if that is known,
         ``times`` if they are uneven, ``trial`` (the name of the individual, or
         ``(trial, individual)``) and ``levels``.
 
@@ -109,6 +109,7 @@ def from_poses(
     times, unit, fps = _read_times(position, attrs)
     if times is None:
         facts["frame_rate"] = fps if frame_rate is None else float(frame_rate)
+        facts |= {} if facts["frame_rate"] is None else {"first_time": 0.0}
     else:
         facts |= describe_times(
             "The poses", times, stated=fps, frame_rate=frame_rate, unit=unit, may_be_thinned=True
@@ -196,7 +197,8 @@ def _read_times(position, attrs):
         return None, None, fps
     times, unit = position.coords["time"].values, attrs.get("time_unit")
     if times.dtype.kind in "mM":
-        times, unit = (times - times[0]) / np.timedelta64(1, "s"), "seconds"
+        start = times[0] if times.dtype.kind == "M" else np.timedelta64(0, "s")
+        times, unit = (times - start) / np.timedelta64(1, "s"), "seconds"
     elif times.dtype.kind not in "fiu":
         raise ValueError(f"The times of poses must be numbers, got {times.dtype}.")
     times = times.astype(np.float64)

@@ -16,7 +16,7 @@ from ..body.skeleton import Skeleton, parse_joint_columns
 from ..inputs.collections import check_members
 from ..inputs.facts import units_of_columns
 from ..inputs.numbers import as_numbers, check_finite
-from ..inputs.recorded import frame_rate_of_rows, start_of_rows
+from ..inputs.recorded import Recorded, frame_rate_of_rows, times_of_rows
 from ..inputs.types import Path, Table, TrialLike
 from ..inputs.wording import counted
 from ..matching.counting import whole
@@ -114,16 +114,16 @@ def write_motion(
     rate = frame_rate_of_rows(X) if frame_rate is None else frame_rate
     if rate is None:
         raise ValueError(f"{path}: the frame rate is not known: give frame_rate=.")
-    start = start_of_rows(X)
+    times = _written_times(X, rate)
     if ending in (".mot", ".sto"):
-        text = _write_storage(X, rate, start, path)
+        text = _write_storage(X, times, path)
     else:
         joints, parents, points, up = _read_positions(X, skeleton, path)
         _printable(joints, path)
         if in_place:
             points = _in_place(points, parents, up)
         if ending == ".trc":
-            text = _write_trc(joints, points, rate, start, getattr(X, "attrs", {}), path)
+            text = _write_trc(joints, points, rate, times, X, path)
         else:
             text = _write_bvh(joints, parents, points, up, rate, _rig_like(like, X, path), path)
     write_whole(path, text)
@@ -229,7 +229,8 @@ def _hierarchy(rig, offsets, j, depth):
 # -- TRC, MOT and STO --------------------------------------------------------------------
 
 
-def _write_trc(joints, points, rate, start, attrs, path):
+def _write_trc(joints, points, rate, times, X, path):
+    attrs = Recorded(X).attrs_of(np.arange(len(X))) if isinstance(X, pd.DataFrame) else {}
     units = attrs.get("units") if isinstance(attrs.get("units"), str) else "m"
     n_frames, first = len(points), attrs.get("first_frame") or 1
     keys = "DataRate CameraRate NumFrames NumMarkers Units OrigDataRate OrigDataStartFrame"
@@ -242,14 +243,13 @@ def _write_trc(joints, points, rate, start, attrs, path):
         "\t\t" + "\t".join(f"{axis}{j + 1}" for j in range(len(joints)) for axis in "XYZ"),
         "",
     ]
-    rows = zip(_times(n_frames, rate, start), points.reshape(n_frames, -1), strict=True)
-    for k, (time, row) in enumerate(rows):
+    for k, (time, row) in enumerate(zip(times, points.reshape(n_frames, -1), strict=True)):
         numbers = ["" if np.isnan(v) else f"{v:.{_DIGITS}f}" for v in row]
         lines.append("\t".join([str(first + k), time, *numbers]))
     return "\n".join(lines) + "\n"
 
 
-def _write_storage(X, rate, start, path):
+def _write_storage(X, times, path):
     if not isinstance(X, pd.DataFrame):
         raise ValueError(f"{path}: give a DataFrame, whose columns have names.")
     values = as_numbers(X, f"{path}: X", dtype=np.float64)
@@ -269,15 +269,15 @@ def _write_storage(X, rate, start, path):
     # Without angles nothing is said of them.
     lines += [f"inDegrees={'yes' if kind == 'deg' else 'no'}" for kind in angles]
     lines += ["endheader", "\t".join(["time", *_printable(X.columns, path)])]
-    for time, row in zip(_times(len(X), rate, start), values, strict=True):
+    for time, row in zip(times, values, strict=True):
         lines.append("\t".join([time, *(f"{v:.8g}" for v in row)]))
     return "\n".join(lines) + "\n"
 
 
-def _times(n_frames, rate, start):
-    """The times of frames as text, of which those of a high rate have more digits."""
+def _written_times(X, rate):
+    """The times of rows as text, of which those of a high rate have more digits."""
     digits = _DIGITS + max(0, whole(np.log10(rate), "up"))
-    return [f"{time:.{digits}f}" for time in start + np.arange(n_frames) / rate]
+    return [f"{time:.{digits}f}" for time in times_of_rows(X, np.arange(len(X)), rate)]
 
 
 def _printable(names, path):

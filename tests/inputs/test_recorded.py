@@ -304,7 +304,7 @@ def test_rows_have_the_events_and_the_clock_of_their_frames(first, stop, step):
         facts = Recorded(df).attrs_of(places)
         assert facts["units"] == "mm"
         assert facts["first_time"] == pytest.approx(2 + first / RATE)
-        assert facts.get("first_frame") == (5 if first == 0 else None)
+        assert facts["first_frame"] == 5 + first
         whole = len(places) == len(df)
         # A whole table may hold several trials, rows mixed, and the rate is that of each.
         assert facts["frame_rate"] == (RATE if len(df) == 60 else RATE / step)

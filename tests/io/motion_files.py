@@ -118,6 +118,16 @@ def texts(*words):
     return -1, [width, len(words)], "".join(word.ljust(width) for word in words).encode()
 
 
+def floats(*values):
+    """A parameter of floats."""
+    return 4, [len(values)], struct.pack(f"<{len(values)}f", *values)
+
+
+def words(*values):
+    """A parameter of integers of 16 bits."""
+    return 2, [len(values)], struct.pack(f"<{len(values)}H", *(v % 65536 for v in values))
+
+
 def c3d(
     positions,
     machine=84,

@@ -8,15 +8,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync.io import read_motion
 
-from motion_files import c3d, put, texts, tracks
-
-
-def floats(*values):
-    return 4, [len(values)], struct.pack(f"<{len(values)}f", *values)
-
-
-def words(*values):
-    return 2, [len(values)], struct.pack(f"<{len(values)}H", *(v % 65536 for v in values))
+from motion_files import c3d, floats, put, texts, tracks, words
 
 
 @pytest.mark.parametrize("machine", [84, 85, 86])

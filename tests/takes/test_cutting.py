@@ -52,7 +52,7 @@ def test_events_and_times_are_those_of_the_trial(step):
     assert later.attrs["events"] == [{"label": "off", "frame": 1.5}]
     assert later.attrs["frame_rate"] == 120 / step
     assert later.attrs["first_time"] == 2 + 4 * step / 120
-    assert "first_frame" not in later.attrs
+    assert later.attrs["first_frame"] == 7 + 4 * step
     assert (first.attrs["first_frame"], first.attrs["first_time"]) == (7, 2.0)
     # An index in seconds tells a frame rate, but not where the events are.
     with pytest.warns(UserWarning, match=r"index has .* frames a second, .* is 120"):
