@@ -152,10 +152,10 @@ def first_time_of(attrs):
 
 
 def _rows_per_frame(attrs):
-    """Analog channels have several rows in a frame of the trial."""
+    """Analog channels and segments may have several rows in a frame of the trial."""
     groups = attrs.get("groups", {})
-    rates = [groups.get(group, {}).get("frame_rate") for group in ("analog", "markers")]
-    return rates[0] / rates[1] if attrs.get("kind") == "analog" and all(rates) else 1
+    rates = [groups.get(group, {}).get("frame_rate") for group in (attrs.get("kind"), "markers")]
+    return rates[0] / rates[1] if all(rates) else 1
 
 
 def names_seconds(name):

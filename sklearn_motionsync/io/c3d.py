@@ -1,6 +1,7 @@
 """C3D: markers, quantities computed from them, and analog channels of optical motion capture."""
 
 import math
+import re
 import warnings
 
 import numpy as np
@@ -27,24 +28,33 @@ _MAX_HEADER_EVENTS = 18
 _LONG_LABELS = 12345
 
 
-def read_c3d(path, *, group="markers"):
+def read_c3d(path, *, group=None):
     """A C3D file as a reader of `motion.FORMATS` returns it; invalid points are NaN.
 
-    `group` is "markers", "analog", or a group of points that the file lists.
+    `group` is "markers", "analog", "segments", or a group of points that the file lists; by default
+    the markers, or the segments of a file without any.
     """
     file = _File(path)
     parameters = _Parameters(file)
-    n_points, n_stated, per_frame = _read_counts(file, parameters)
-    frames = _Frames(file, parameters, n_points, n_stated, per_frame)
     rate = parameters.number("POINT", "RATE", file.float(20))
     rate = float(rate) if is_rate(rate) else None
+    segments = _Segments(file, parameters, rate)
+    n_points, n_stated, per_frame = _read_counts(file, parameters, segments)
+    frames = None
+    if n_points or any(n_stated):
+        frames = _Frames(file, parameters, segments, n_points, n_stated, per_frame)
+    group = group or ("markers" if n_points or not segments.n else "segments")
     labels = _read_labels(parameters, "POINT", n_points, "marker")
     members = _read_point_groups(parameters, labels)
     groups = {
         name: {"n": len(points), "units": units, "frame_rate": rate}
         for name, (points, units) in members.items()
     }
-    if frames.n_analog:
+    if segments.n:
+        segments_rate = None if rate is None else rate * segments.per_frame
+        units = groups["markers"]["units"]
+        groups["segments"] = {"n": segments.n, "units": units, "frame_rate": segments_rate}
+    if frames and frames.n_analog:
         n_channels = frames.n_analog // per_frame
         units = (parameters.texts("ANALOG", "UNITS") + [""] * n_channels)[:n_channels]
         groups["analog"] = {
@@ -67,12 +77,17 @@ def read_c3d(path, *, group="markers"):
         "groups": groups,
         "left_out": _describe_others(parameters, groups, group, n_untimed),
     }
+    for event in events if group in ("analog", "segments") and rate is not None else ():
+        event["frame"] *= per_frame if group == "analog" else segments.per_frame
     if group == "analog":
-        for event in events:
-            event["frame"] = None if event["frame"] is None else event["frame"] * per_frame
         channels = _read_labels(parameters, "ANALOG", n_channels, "channel")
         values = _read_analog(frames, parameters, n_channels)
         return facts | {"channels": make_unique(channels), "values": values}
+    if group == "segments":
+        joints = make_unique(segments.labels)
+        return facts | {
+            "joints": joints, "parents": [-1] * len(joints), "positions": segments.read_origins()
+        }  # fmt: skip
     points = members[group][0]
     positions = _read_points(frames, points, computed=group != "markers")
     joints, subjects = split_subjects([labels[i] for i in points], labels)
@@ -241,13 +256,53 @@ class _Parameters:
 # -- the data: frames of points and analog values ---------------------------------------
 
 
-def _read_counts(file, parameters):
+class _Segments:
+    """The matrices (4, 4) from segments to the laboratory, the group ROTATION of markerless files.
+
+    Columns stand one behind the other, and behind them a reliability, below 0 of one not seen. The
+    last column is the origin.
+    """
+
+    def __init__(self, file, parameters, rate):
+        self._file, self._parameters = file, parameters
+
+        def whole(name, default):
+            number = parameters.number("ROTATION", name, default)
+            return int(number) if number in range(1, 2**16) else default
+
+        self.n, self.start = whole("USED", 0), (whole("DATA_START", 1) - 1) * _BLOCK
+        ratio = round(parameters.number("ROTATION", "RATE", rate or 1) / (rate or 1), 6)
+        self.per_frame = whole("RATIO", int(ratio) if ratio in range(1, 2**16) else 1)
+        labels = _read_labels(parameters, "ROTATION", self.n, "segment")
+        self.labels = [re.sub("_4x4$", "", label, flags=re.IGNORECASE) for label in labels]
+
+    def read_origins(self):
+        """Positions (n_frames, n, 3), NaN where a segment was not seen."""
+        file, size = self._file, 4 * 17 * self.n
+        end = file.data_start if file.data_start > self.start else len(file.data)
+        if not file.first_parameter < self.start < len(file.data):
+            raise file.error(
+                f"ROTATION:DATA_START says that rotations begin at byte {self.start}; they must "
+                f"lie behind byte {file.first_parameter} and before the end at {len(file.data)}"
+            )
+        stated = {n * self.per_frame for n in _stated_frames(file, self._parameters)}
+        stated = [*_whole([self._parameters.number("ROTATION", "FRAMES", 0)]), *sorted(stated)]
+        n_frames = _count_frames(file, stated, size, self.start, end)
+        numbers = file.floats(np.frombuffer(file.data, np.uint8, n_frames * size, self.start))
+        numbers = numbers.reshape(n_frames, self.n, 17)
+        unseen = (numbers[..., 16] < 0) | (numbers[..., :16] == 0).all(axis=2)
+        positions = numbers[..., 12:15].copy()
+        positions[unseen | ~np.isfinite(positions).all(axis=2)] = np.nan
+        return positions
+
+
+def _read_counts(file, parameters, segments):
     """Numbers of points in a frame, of analog values as header and section state it, and of values
     of a channel.
     """
     n_points, n_analog, per_frame = (file.integer(at) for at in (2, 4, 18))
     used = parameters.number("POINT", "USED", n_points)
-    if used != n_points or not (n_points or n_analog):
+    if used != n_points or not (n_points or n_analog or segments.n):
         raise file.error(
             f"the header says {n_points} markers, POINT:USED says {used:g}; both must be the same "
             "and above 0"
@@ -260,7 +315,7 @@ def _read_counts(file, parameters):
 class _Frames:
     """The numbers of all frames, and how they are written."""
 
-    def __init__(self, file, parameters, n_points, n_stated, per_frame):
+    def __init__(self, file, parameters, segments, n_points, n_stated, per_frame):
         self.file = file
         self.n_points = n_points
         scale = _read_scale(file, parameters)
@@ -275,7 +330,9 @@ class _Frames:
                 f"{stated * _BLOCK:g}; both must be the same, behind the parameters at byte "
                 f"{file.first_parameter} and before the end at byte {len(file.data)}"
             )
-        stated, n_bytes = _stated_frames(file, parameters), len(file.data) - start
+        has_end = segments.n and start < segments.start < len(file.data)
+        end = segments.start if has_end else len(file.data)
+        stated, n_bytes = _stated_frames(file, parameters), end - start
         fitting = {n for n in n_stated if n >= 0 and n % per_frame == 0}
         if len(set(n_stated)) > 1:
             # The size decides. Data are padded to whole blocks.
@@ -289,7 +346,7 @@ class _Frames:
             )
         self.n_analog = int(fitting.pop())
         frame_bytes = self.frame_bytes(self.n_analog)
-        self.n_frames = _count_frames(file, stated, frame_bytes, n_bytes)
+        self.n_frames = _count_frames(file, stated, frame_bytes, start, end)
         raw = np.frombuffer(file.data, np.uint8, self.n_frames * frame_bytes, start)
         self._raw = raw.reshape(self.n_frames, frame_bytes)
 
@@ -334,32 +391,49 @@ def _stated_frames(file, parameters):
     Long recordings do not fit the 16 bits of the header, and writers worked around that
     in different ways.
     """
-    header = file.integer(8) - file.integer(6) + 1
-    stated = {header}
-    stated |= {parameters.number("POINT", name, 0) for name in ("FRAMES", "LONG_FRAMES")}
+    first, last = file.integer(6), file.integer(8)
+    more = [parameters.number("POINT", name, 0) for name in ("FRAMES", "LONG_FRAMES")]
     limits = [parameters.numbers("TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
     if all(len(limit) == 2 for limit in limits):
         low, high = (limit[0] + 65536 * limit[1] for limit in limits)
-        stated.add(high - low + 1)
-    return sorted(
-        (int(n) for n in stated if math.isfinite(n) and n > 0 and n == int(n)),
-        key=lambda n: (n != header, -n),
-    )
+        more.append(high - low + 1)
+    more = _whole(sorted(more, reverse=True))
+    # A larger number may stand in the header as the largest.
+    header = [] if more and last == 2**16 - 1 else _whole([(last - first + 1) % 2**16])
+    return list(dict.fromkeys(header + more))
 
 
-def _count_frames(file, stated, frame_bytes, n_bytes):
-    """The number of frames. Where the file states several, its size decides."""
-    possible = [n for n in stated if n * frame_bytes <= n_bytes]
+def _whole(numbers):
+    return [int(n) for n in numbers if math.isfinite(n) and n > 0 and n == int(n)]
+
+
+def _count_frames(file, stated, frame_bytes, first, end):
+    """The number of frames between two bytes, of those that the file states, or that 16 bits hide.
+
+    Zeros at the end may be what fills the last block. Where numbers differ, a warning tells them.
+    """
+    n_bytes, held = end - first, (end - first) // frame_bytes
+    filled = min(held, -(-len(file.data[first:end].rstrip(b"\0")) // frame_bytes))
+    numbers = " or ".join(map(str, sorted(set(stated)))) or "no"
+    # The header has 16 bits for a number: larger ones are 65535, or lack their higher bits.
+    possible = [n + over for over in range(0, held, 2**16) for n in stated if n + over <= held]
     exact = [n for n in possible if n_bytes - n * frame_bytes < _BLOCK]
-    if exact:
-        return exact[0]
-    if len(stated) == 1 and possible:
-        return stated[0]
-    numbers = " or ".join(map(str, sorted(stated))) or "no"
-    raise file.error(
-        f"it says {numbers} frames of {frame_bytes} bytes, but holds "
-        f"{n_bytes / frame_bytes:.1f} frames; it is not complete, or its header is wrong"
-    )
+    fitting = [n for n in [*exact, *possible] if n >= filled] or exact
+    if not fitting and not 0 < max(stated, default=0) * frame_bytes <= n_bytes:
+        raise file.error(
+            f"it says {numbers} frames of {frame_bytes} bytes, but holds "
+            f"{n_bytes / frame_bytes:.1f} frames; it is not complete, or its header is wrong"
+        )
+    n_frames = (fitting or [filled])[0]
+    in_16_bits = {n_frames, n_frames % 2**16, min(n_frames, 2**16 - 1)}
+    if n_frames not in stated or not in_16_bits.issuperset(stated):
+        warnings.warn(
+            f"{file.path.name}: it says {numbers} frames, and its data hold {n_frames}, which are "
+            "read. Look at the last ones.",
+            UserWarning,
+            stacklevel=6,
+        )
+    return n_frames
 
 
 def _read_points(frames, points, computed):
@@ -492,7 +566,10 @@ def _read_point_groups(parameters, labels):
 
 def _describe_others(parameters, groups, group, n_untimed):
     """The contents of the file beside the group, in one line; empty if there are none."""
-    contents = describe_groups(groups, group, {})
+    contents = describe_groups({k: x for k, x in groups.items() if k != "segments"}, group, {})
+    if "segments" in groups:
+        of_them = "the rotations of " if group == "segments" else "the origins and rotations of "
+        contents.append(of_them + counted(groups["segments"]["n"], "segment"))
     plates = parameters.number("FORCE_PLATFORM", "USED", 0)
     if math.isfinite(plates) and plates > 0:
         contents.append(f"the geometry of {counted(plates, 'force plate')}")

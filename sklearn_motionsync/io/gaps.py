@@ -15,7 +15,7 @@ from ..matching.gaps import interpolate_gaps
 from .events import name_recording
 
 # Kinds of what joints are the names of; angles and forces have no positions.
-_POSITIONS = ("joints", "markers", "keypoints")
+_POSITIONS = ("joints", "markers", "segments", "keypoints")
 
 
 def find_gaps(df: pd.DataFrame) -> pd.DataFrame:

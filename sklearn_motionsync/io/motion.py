@@ -129,10 +129,11 @@ def read_motion(
         "trim" leaves out the frames before the first and after the last one in which all joints or
         markers are seen; see `fill_gaps`. Other groups of the file are longer then.
     group : str, default=None
-        The group of a C3D file or of a CSV of Vicon Nexus to read: by default its "markers";
-        "angles", "forces", "moments", "powers", "scalars" or "reactions", if the file has such
-        points; "analog" for the analog channels. Of a CSV of Motive "joints" or "markers". Of
-        several files those that have no such group are left out.
+        The group of a C3D file or of a CSV of Vicon Nexus to read: by default its "markers", or
+        the "segments" of a C3D file that has rotations only; "angles", "forces", "moments",
+        "powers", "scalars" or "reactions", if the file has such points; "analog" for the analog
+        channels. Of a CSV of Motive "joints" or "markers". Of several files those that have no
+        such group are left out.
     columns : {None, "common"}, default=None
         Of several files: "common" leaves out the columns that some of them lack, such as other
         markers, and brings the others into the order of the first. By default all stay.
@@ -175,7 +176,7 @@ def read_motion(
         If positions or values are missing, or beyond those of any recording, so that they become
         NaN; if times are uneven, or contradict the frame rate that
         the file states, unless `frame_rate` is given; if a file or columns of several are left
-        out; if a C3D file states two scales.
+        out; if a C3D file states two scales, or numbers of frames that its data contradict.
 
     See Also
     --------
@@ -341,7 +342,7 @@ def _hide_damage(motion, path):
     """What is larger than any recording, as of a flipped bit, becomes NaN, or is refused."""
     kind, joints = motion["kind"], motion.get("joints")
     values = motion["values"] if joints is None else motion["positions"]
-    limit = FARTHEST if kind in ("joints", "markers", "angles") else LARGEST
+    limit = FARTHEST if kind in ("joints", "markers", "segments", "angles") else LARGEST
     damaged = np.abs(values) > limit
     if not damaged.any():
         return

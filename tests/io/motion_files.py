@@ -140,11 +140,13 @@ def c3d(
     words=None,
     order=None,
     n_blocks=None,
+    rotations=None,
 ):
     """A C3D file of positions (n_frames, n_points, 3); NaN is invalid.
 
     `others` are groups of parameters beside POINT, `analog` raw values (n_frames, samples,
-    channels), `words` the fourth numbers of the points, `order` that of integers.
+    channels), `words` the fourth numbers of the points, `order` that of integers, `rotations`
+    (n_frames, n_segments, 17) what follows the points.
     """
     n_frames, n_points = positions.shape[:2]
     float_order = ">" if machine == 86 else "<"
@@ -169,9 +171,13 @@ def c3d(
         "Y_SCREEN": (-1, [2], b"+Z"),
     } | (changes or {})
 
+    n_data = n_frames * (4 * n_points + analog[0].size if n_frames else 0) * (4 if real else 2)
+
     def written(start):
         if point["DATA_START"] is not None:
             point["DATA_START"] = (2, [], whole(start))
+        if rotations is not None:
+            others["ROTATION"]["DATA_START"] = (2, [], whole(start + -(-n_data // 512)))
         section = b""
         for number, (group, members) in enumerate(({"POINT": point} | (others or {})).items(), 1):
             section += bytes([len(group), 256 - number]) + group.encode() + whole(3) + b"\0"
@@ -209,7 +215,26 @@ def c3d(
         for value in analog[frame].ravel():
             data += number(value) if real else whole(int(value) % 65536)
     data += bytes(-len(data) % 512)
+    for value in () if rotations is None else rotations.ravel():
+        data += number(value)
+    data += bytes(-len(data) % 512)
     return head.ljust(512, b"\0") + section.ljust(512 * needed, b"\0") + data + tail
+
+
+def poses(n_frames=40, n=2):
+    """Matrices of segments, column by column, and their reliability, of which 0 is good."""
+    rng = np.random.default_rng(1)
+    matrices = np.zeros((n_frames, n, 4, 4))
+    matrices[..., :3, :3] = rng.integers(-9, 9, (n_frames, n, 3, 3))
+    matrices[..., :3, 3] = rng.integers(-900, 900, (n_frames, n, 3)) / 2
+    matrices[..., 3, 3] = 1
+    columns = matrices.swapaxes(2, 3).reshape(n_frames, n, 16)
+    return np.concatenate([columns, np.zeros((n_frames, n, 1))], axis=2)
+
+
+def rotation_parameters(n=2, **changes):
+    labels = texts(*[f"{name}_4X4" for name in ("pelvis", "l_thigh", "head")][:n])
+    return {"USED": words(n), "LABELS": labels, "DATA_START": None} | changes
 
 
 def tracks(n_frames=40, gap=None):
@@ -246,7 +271,8 @@ def everything(machine=84):
         "machine": machine,
         "analog": np.random.default_rng(0).integers(-900, 900, (40, 2, 2)),
         "changes": {"ANGLES": texts("M2"), "ANGLE_UNITS": texts("deg")},
-        "others": {"EVENT": events, "ANALOG": analog},
+        "others": {"EVENT": events, "ANALOG": analog, "ROTATION": rotation_parameters()},
+        "rotations": poses(),
         "header": {"first": 101, "last": 140, "events": [("RHS", 0.5), ("RTO", 0.1)]},
     }
 
