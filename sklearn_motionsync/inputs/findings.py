@@ -51,7 +51,7 @@ _EXCHANGES = {
 # Frames of a trial that tell its size and its axes.
 _SAMPLED = 16
 # Kinds that a fit warns of: each changes what is learnt.
-_WARNED = ("wrapping", "quaternion", "quality", "fill value", "clock", "zeros at the end")
+_WARNED: tuple[str, ...] = ("wrapping", "quaternion", "quality", "fill value", "clock", "zeros at the end")
 _WARNED += ("factor", "exchanged axes")
 _MEND = {
     "wrapping": "np.unwrap(x, period={period:.6g}, axis=0), or mend_trials(X, ['wrapping'])",
