@@ -76,6 +76,12 @@ def test_cells_keep_times_types_and_labels_of_several_levels(trials):
     assert seconds.max() == pytest.approx(0.23)
 
 
+def test_a_sample_of_a_nested_table(trials):
+    sync = DenseSynchronizer(n_frames=20, max_fit=5, random_state=0)
+    tables = sync.fit(nested(trials)).pattern_, sync.fit(trials).pattern_
+    np.testing.assert_array_equal(*tables)
+
+
 def test_lists_in_a_table_of_polars(trials):
     rows = pl.DataFrame({"trial": np.repeat(np.arange(12), [len(x) for x in trials])})
     rows = rows.with_columns(

@@ -209,6 +209,11 @@ def test_several_files_are_read_as_a_list(tmp_path):
         read_motion([])
     with pytest.raises(ValueError, match=r"walk0\.c3d: there are no angles"):
         read_motion(paths, group="angles")
+    # A file without the group is left out while another one has it.
+    angles = put(tmp_path, c3d(tracks(), changes={"ANGLES": texts("M1")}), "angles.c3d")
+    with pytest.warns(UserWarning, match=r"walk0\.c3d: there are no angles .*left out"):
+        (only,) = read_motion([paths[0], angles], group="angles")
+    pd.testing.assert_frame_equal(only, read_motion(angles, group="angles"))
     for given, columns in ((paths, "all"), (paths[0], "common")):
         with pytest.raises(ValueError, match="columns must be None, or 'common' with a list"):
             read_motion(given, columns=columns)
