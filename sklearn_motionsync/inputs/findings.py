@@ -51,8 +51,8 @@ _EXCHANGES = {
 # Frames of a trial that tell its size and its axes.
 _SAMPLED = 16
 # Kinds that a fit warns of: each changes what is learnt.
-_WARNED: tuple[str, ...] = ("wrapping", "quaternion", "quality", "fill value", "clock", "zeros at the end")
-_WARNED += ("factor", "exchanged axes")
+_WARNED: tuple[str, ...] = ("wrapping", "quaternion", "quality", "fill value", "clock")
+_WARNED += ("zeros at the end", "factor", "exchanged axes")
 _MEND = {
     "wrapping": "np.unwrap(x, period={period:.6g}, axis=0), or mend_trials(X, ['wrapping'])",
     "quaternion": "mend_trials(X, ['quaternion']), or angles in place of quaternions",

@@ -15,7 +15,7 @@ from ..matching.gaps import interpolate_gaps
 from .events import name_recording
 
 # Kinds of what joints are the names of; angles and forces have no positions.
-_POSITIONS = ("joints", "markers", "segments", "keypoints")
+POSITIONS = ("joints", "markers", "segments", "keypoints")
 
 
 def find_gaps(df: pd.DataFrame) -> pd.DataFrame:
@@ -187,7 +187,7 @@ def warn_of_gaps(df, name):
     else:
         gaps, n_columns = find_gaps(df), len(parse_joint_columns(df)[0])
         n_missing = gaps.groupby("joint")["n_frames"].sum()
-        what = "positions" if kind in _POSITIONS else "values"
+        what = "positions" if kind in POSITIONS else "values"
         n_outside = int((~gaps["inside"]).sum())
         ends = f"; {n_outside} touch an end, where ends='trim' leaves frames out" * bool(n_outside)
         advice = (

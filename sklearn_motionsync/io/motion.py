@@ -22,7 +22,8 @@ from ..inputs.wording import counted
 from .acclaim import read_acclaim
 from .bvh import read_bvh
 from .c3d import read_c3d
-from .gaps import check_filling, fill_gaps, warn_of_gaps
+from .gaps import POSITIONS, check_filling, fill_gaps, warn_of_gaps
+from .keypoints import KEYPOINT_FORMATS
 from .labs import QTM, VICON, read_motive, read_qtm, read_vicon
 from .text import FARTHEST, make_unique, read_storage
 from .trc import read_trc
@@ -92,6 +93,7 @@ FORMATS = [
         lambda path, head: head.lstrip(b'"').startswith(b"Format Version"),
         read_motive,
     ),
+    *(MotionFormat(*each) for each in KEYPOINT_FORMATS),
 ]
 ENDINGS = tuple(ending for each in FORMATS for ending in each.endings)
 
@@ -342,7 +344,7 @@ def _hide_damage(motion, path):
     """What is larger than any recording, as of a flipped bit, becomes NaN, or is refused."""
     kind, joints = motion["kind"], motion.get("joints")
     values = motion["values"] if joints is None else motion["positions"]
-    limit = FARTHEST if kind in ("joints", "markers", "segments", "angles") else LARGEST
+    limit = FARTHEST if kind in (*POSITIONS, "angles") else LARGEST
     damaged = np.abs(values) > limit
     if not damaged.any():
         return

@@ -1,5 +1,7 @@
 """Small files of motion capture."""
 
+import io
+import json
 import struct
 
 import numpy as np
@@ -47,6 +49,7 @@ def body(order="ZXY"):
 
 def put(folder, text, name="a.bvh"):
     path = folder / name
+    path.parent.mkdir(exist_ok=True)
     path.write_bytes(text if isinstance(text, bytes) else text.encode("latin-1"))
     return path
 
@@ -387,9 +390,66 @@ def nexus():
     return "\n".join([events, outputs, markers, devices]), values, forces
 
 
+def table(columns, rows, separator=","):
+    """A table of text, blank where a number is missing."""
+    cells = [["" if value is None else str(value) for value in row] for row in rows]
+    return "".join(separator.join(row) + "\n" for row in [columns, *cells])
+
+
+def deeplabcut(tracked, joints, animals=None):
+    """A CSV file of DeepLabCut of x, y and likelihood (n_frames, n_columns, 3)."""
+    names = [name for _ in animals or [0] for name in joints for _ in range(3)]
+    header = [["scorer"] + ["net"] * len(names), ["bodyparts", *names]]
+    if animals:
+        header.insert(1, ["individuals", *np.repeat(animals, 3 * len(joints))])
+    header.append(["coords"] + ["x", "y", "likelihood"] * (len(names) // 3))
+    rows = [[k, *frame.ravel().tolist()] for k, frame in enumerate(tracked)]
+    return table(header[0], header[1:] + rows)
+
+
+def sleap(tracked, tracks, joints, start=0):
+    """A CSV file of SLEAP of x, y and score (n_frames, n_tracks, n_joints, 3)."""
+    columns = [f"{joint}.{tail}" for joint in joints for tail in ("x", "y", "score")]
+    rows = [
+        [track, start + k, 0.9, *frame[i].ravel().tolist()]
+        for k, frame in enumerate(tracked)
+        for i, track in enumerate(tracks)
+    ]
+    return table(["track", "frame_idx", "instance.score", *columns], rows)
+
+
+def openpose(frames, name="a/a_{:012d}_keypoints.json", first=0):
+    """The files of a folder of OpenPose: for each frame a list of people (n_joints, 3)."""
+    files = {}
+    for number, people in enumerate(frames, first):
+        found = [{"person_id": [-1], "pose_keypoints_2d": x.ravel().tolist()} for x in people]
+        files[name.format(number)] = json.dumps({"version": 1.3, "people": found}).encode()
+    return files
+
+
+def npy(array):
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def tracked(*shape):
+    """Positions in pixels and, last, a confidence between 0.5 and 1."""
+    numbers = np.random.default_rng(0).integers(20, 900, shape) / 4
+    numbers[..., -1] = 0.5 + numbers[..., -1] / 900
+    return numbers
+
+
+def landmarks(n_frames=6):
+    columns = [f"{a}{k}" for k in range(33) for a in "xyzv"]
+    rows = tracked(n_frames, 33, 4).reshape(n_frames, -1)
+    times = [[k, 40 * k] for k in range(n_frames)]
+    return table(["frame", "timestamp_ms", *columns], np.hstack([times, rows]).tolist())
+
+
 VECTORS, VEC3 = [["1,2,3", "~[4,5,6]"]] * 20, "DataType=Vec3\nDataRate=100\n"
 # For each format a function that returns the files of a small example, {name: bytes}, the first of
-# which is read.
+# which is read, or its folder for a file of JSON.
 EXAMPLES = {
     "bvh": lambda: {"a.bvh": body().encode()},
     "amc": lambda: {"a.amc": AMC.encode(), "a.asf": ASF.encode("latin-1")},
@@ -412,6 +472,19 @@ EXAMPLES = {
             + part("Marker", "S:HTop", 3, False),
             np.random.default_rng(0).integers(-9, 9, (20, 17)) / 8,
             parents=[0] * 7 + [1] * 7 + [""] * 3,
+        ).encode()
+    },
+    "sleap": lambda: {"a.csv": sleap(tracked(9, 1, 2, 3), ["ann"], ["hip", "knee"]).encode()},
+    "deeplabcut": lambda: {
+        "a.csv": deeplabcut(tracked(9, 2, 3), ["hip", "knee"], ["ann"]).encode()
+    },
+    "openpose": lambda: openpose([tracked(1, 25, 3), tracked(1, 25, 3) + 1]),
+    "mediapipe": lambda: {"a.csv": landmarks().encode()},
+    "array": lambda: {"a.npy": npy(tracked(9, 4, 3))},
+    "table": lambda: {
+        "a.csv": table(
+            ["Time", "HipLeft X", "HipLeft Y", "HipLeft Z", "HipLeft State"],
+            [[k / 50, *row, "Tracked"] for k, row in enumerate(tracked(9, 3).tolist())],
         ).encode()
     },
 }

@@ -1,0 +1,338 @@
+"""Key-points of trackers and tables of joints: numbers that the tests wrote, names, clocks."""
+
+import json
+import sys
+import types
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import Skeleton
+from sklearn_motionsync.io import read_motion
+
+from motion_files import deeplabcut, landmarks, npy, openpose, put, sleap, table, tracked
+
+MISSING = pytest.mark.filterwarnings("ignore:.*are missing:UserWarning")
+SEVERAL = pytest.mark.filterwarnings("ignore:.* holds 2 subjects:UserWarning")
+ANIMALS, JOINTS = ["ann", "bob"], ["hip", "knee"]
+TRACKED = tracked(7, 2, 2, 3)
+
+
+def positions(df):
+    """Positions (n_frames, n_joints, n_axes)."""
+    return df.to_numpy().reshape(len(df), len(df.attrs["joints"]), -1)
+
+
+def check(df, expected, joints):
+    np.testing.assert_array_equal(positions(df), expected)
+    assert df.attrs["joints"] == list(joints)
+
+
+# -- trackers ---------------------------------------------------------------------------
+
+
+@SEVERAL
+@MISSING
+def test_deeplabcut_of_one_animal_and_of_several(tmp_path):
+    one = put(tmp_path, deeplabcut(TRACKED[:, 0], JOINTS), "one.csv")
+    df = read_motion(one, frame_rate=30)
+    check(df, TRACKED[:, 0, :, :2], JOINTS)
+    facts = {"format": "deeplabcut", "units": "px", "up": "-y", "frame_rate": 30.0}
+    assert facts.items() <= df.attrs.items()
+    path = put(tmp_path, deeplabcut(TRACKED.reshape(7, 4, 3), JOINTS, ANIMALS), "both.csv")
+    both = read_motion(path)
+    check(both, TRACKED.reshape(7, 4, 3)[..., :2], [f"{a}:{b}" for a in ANIMALS for b in JOINTS])
+    limit = float(np.median(TRACKED[:, 1, :, 2]))
+    bob = read_motion(path, subject="bob", min_confidence=limit, quality="keep")
+    np.testing.assert_array_equal(bob[["hip_confidence", "knee_confidence"]], TRACKED[:, 1, :, 2])
+    seen = np.where(TRACKED[:, 1, :, 2:] >= limit, TRACKED[:, 1, :, :2], np.nan)
+    check(bob.iloc[:, :4].copy(), seen, JOINTS)
+    assert np.isnan(seen).any()
+
+
+def test_hdf5_of_deeplabcut_is_that_of_its_csv(tmp_path, monkeypatch):
+    path = put(tmp_path, b"\x89HDF\r\n\x1a\n", "a.h5")
+    monkeypatch.setitem(sys.modules, "tables", None)
+    with pytest.raises(ValueError, match=r"a\.h5 .* the package 'tables' is needed: pip install"):
+        read_motion(path)
+    monkeypatch.setitem(sys.modules, "tables", types.ModuleType("tables"))
+    columns = pd.MultiIndex.from_product([["net"], ["ann"], JOINTS, ["x", "y", "likelihood"]])
+    df = pd.DataFrame(TRACKED[:, 0].reshape(7, 6), columns=columns)
+    monkeypatch.setattr(pd, "read_hdf", lambda path: df)
+    found = read_motion(path)
+    expected = read_motion(put(tmp_path, deeplabcut(TRACKED[:, 0], JOINTS, ["ann"]), "a.csv"))
+    pd.testing.assert_frame_equal(found, expected)
+    assert found.attrs == expected.attrs
+    monkeypatch.setattr(pd, "read_hdf", lambda path: df.iloc[:, 0] / 0)
+    with pytest.raises(ValueError, match=r"a\.h5 is no table of DeepLabCut"):
+        read_motion(path)
+
+
+@SEVERAL
+@MISSING
+def test_sleap_with_rows_in_any_order(tmp_path):
+    header, *rows = sleap(TRACKED, ANIMALS, JOINTS, start=5).splitlines()
+    lost = [row for row in rows if not row.startswith(("bob,6,", "ann,8,", "bob,8,"))]
+    mixed = np.random.default_rng(0).permutation(lost).tolist()
+    path = put(tmp_path, "\n".join([header, *mixed]), "a.csv")
+    with pytest.warns(UserWarning, match=r"a\.csv skips 1 frame after frame 7, whose positions"):
+        df = read_motion(path)
+    expected = TRACKED[..., :2].copy()
+    expected[1, 1], expected[3] = np.nan, np.nan
+    check(df, expected.reshape(7, 4, 2), [f"{a}:{b}" for a in ANIMALS for b in JOINTS])
+    assert (df.attrs["first_frame"], df.attrs["units"]) == (5, "px")
+    assert df.attrs["left_out"] == "the columns ['instance.score']"
+    # Without tracks the instances of a frame are counted.
+    untracked = sleap(TRACKED, ["", ""], JOINTS)
+    assert read_motion(put(tmp_path, untracked, "b.csv")).attrs["subject"] == ["0", "1"]
+    with pytest.raises(ValueError, match=r"c\.csv: frame 0 comes twice"):
+        read_motion(put(tmp_path, sleap(TRACKED, ["ann", "ann"], JOINTS), "c.csv"))
+
+
+@SEVERAL
+@pytest.mark.parametrize("matlab", [True, False])
+def test_hdf5_of_sleap(tmp_path, monkeypatch, matlab):
+    values, scores = TRACKED[..., :2], TRACKED[..., 2]
+
+    class File(dict):
+        """What h5py gives of such a file."""
+
+        def __init__(self, path):
+            names = {
+                f"{k}_names": np.array(x, "S")
+                for k, x in {"node": JOINTS, "track": ANIMALS}.items()
+            }
+            arrays = {"tracks": values, "point_scores": scores}
+            if matlab:
+                arrays = {
+                    "tracks": values.transpose(1, 3, 2, 0),
+                    "point_scores": scores.transpose(1, 2, 0),
+                }
+            super().__init__(names | arrays)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+    path = put(tmp_path, b"\x89HDF\r\n\x1a\n...node_names...tracks", "a.h5")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(ValueError, match=r"a\.h5 .* the package 'h5py' is needed: pip install"):
+        read_motion(path)
+    monkeypatch.setitem(sys.modules, "h5py", types.SimpleNamespace(File=File))
+    df = read_motion(path, quality="keep")
+    check(
+        df.iloc[:, :8].copy(),
+        values.reshape(7, 4, 2),
+        [f"{a}:{b}" for a in ANIMALS for b in JOINTS],
+    )
+    np.testing.assert_array_equal(df.iloc[:, 8:], scores.reshape(7, 4))
+    monkeypatch.setattr(File, "__enter__", lambda self: {})
+    with pytest.raises(ValueError, match=r"a\.h5 is no analysis of SLEAP"):
+        read_motion(path)
+
+
+@SEVERAL
+@MISSING
+@pytest.mark.filterwarnings("ignore:.*in a frame:UserWarning")
+@pytest.mark.parametrize("n_joints", [18, 25, 7])
+def test_openpose_folder_with_people_gaps_and_empty_frames(tmp_path, n_joints):
+    people = tracked(4, n_joints, 3)
+    people[0, 2] = 0
+    # Numbers count by their value, and not as text.
+    for name, content in openpose(
+        [people[:1], [], people[1:3]], "a/cam_{}_keypoints.json", 9
+    ).items():
+        put(tmp_path, content, name)
+    put(
+        tmp_path,
+        openpose([people[3:]], "a/cam_{}_keypoints.json", 13)["a/cam_13_keypoints.json"],
+        "a/cam_13_keypoints.json",
+    )
+    put(tmp_path, "{}", "a/notes.json")
+    with pytest.warns(UserWarning, match="a skips 1 frame after frame 11"):
+        df = read_motion(tmp_path / "a")
+    expected = np.full((5, 2, n_joints, 2), np.nan)
+    expected[0, 0], expected[2], expected[4, 0] = (
+        people[0, :, :2],
+        people[1:3, :, :2],
+        people[3, :, :2],
+    )
+    expected[0, 0, 2] = np.nan
+    np.testing.assert_array_equal(positions(df), expected.reshape(5, -1, 2))
+    assert df.attrs["subject"] == ["0", "1"]
+    assert (df.attrs["first_frame"], df.attrs["units"], df.attrs["up"]) == (9, "px", "-y")
+    names = [name.removeprefix("0:") for name in df.attrs["joints"][:n_joints]]
+    if n_joints == 25:
+        assert names == list(Skeleton.openpose().joints)
+    elif n_joints == 18:
+        assert [names[k] for k in (0, 1, 7, 8, 13, 17)] == [
+            "Nose",
+            "Neck",
+            "LWrist",
+            "RHip",
+            "LAnkle",
+            "LEar",
+        ]
+    else:
+        assert names == [f"point_{k}" for k in range(7)]
+
+
+def test_openpose_of_one_person_and_other_names(tmp_path):
+    people = tracked(3, 25, 3)
+    people[..., :2] /= 1000
+    for name, content in openpose(people[:, None], "b/cam01.{:04d}.json").items():
+        put(tmp_path, content.replace(b'"person_id": [-1], ', b"").replace(b"_2d", b""), name)
+    df = read_motion(tmp_path / "b")
+    check(df, people[..., :2], Skeleton.openpose().joints)
+    assert df.attrs["units"] is None
+    assert "subject" not in df.attrs
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        (
+            "a_1_keypoints.json",
+            openpose([tracked(1, 25, 3)])["a/a_000000000000_keypoints.json"],
+            "no other",
+        ),
+        ("a_keypoints.json", b'{"people": []}', "its name needs a number"),
+        ("a_2_keypoints.json", b'{"people": [{"pose_keypoints_2d": [1, 2]}]}', "needs 'people'"),
+        ("a_2_keypoints.json", b'{"people": ', "needs 'people'"),
+        ("a_2_keypoints.json", json.dumps({"people": [{"pose_keypoints_2d": [1] * 9}]}), "as many"),
+    ],
+)
+def test_openpose_folders_that_are_wrong(tmp_path, name, content, message):
+    first = openpose([tracked(1, 25, 3)], "b_{:02d}_keypoints.json", first=1)
+    for file, text in (first | {name: content}).items():
+        put(tmp_path, text, f"a/{file}")
+    with pytest.raises(ValueError, match=rf"/a.*{message}"):
+        read_motion(tmp_path / "a")
+
+
+# -- tables and arrays ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "spelling",
+    ["{}_x", "{} X", "{}.x", "x_{}", "{}X"],
+)
+def test_mediapipe_in_several_spellings(tmp_path, spelling):
+    names, values = Skeleton.mediapipe().joints, tracked(4, 33, 4)
+    spelt = (
+        [x.upper() for x in names]
+        if spelling != "{}X"
+        else [x.title().replace("_", "") for x in names]
+    )
+    tails = [
+        spelling.replace("x", a) if "x" in spelling else spelling.replace("X", a.upper())
+        for a in "xyz"
+    ]
+    tails.append(tails[0].replace("x", "visibility").replace("X", "Visibility"))
+    columns = [tail.format(name) for name in spelt for tail in tails]
+    path = put(tmp_path, table(columns, values.reshape(4, -1).tolist()), "a.csv")
+    df = read_motion(path, quality="keep")
+    check(df.iloc[:, :99].copy(), values[..., :3], list(names))
+    np.testing.assert_array_equal(df.iloc[:, 99:], values[..., 3])
+    assert (df.attrs["format"], df.attrs["up"]) == ("mediapipe", "-y")
+    numbered = read_motion(put(tmp_path, landmarks(), "b.csv"))
+    check(numbered, tracked(6, 33, 4)[..., :3], list(names))
+    assert numbered.attrs["frame_rate"] == 25.0
+
+
+@pytest.mark.parametrize("n", [3, 33, 34, 553])
+def test_arrays_have_the_names_of_freemocap(tmp_path, n):
+    array = np.round(tracked(4, n, 3)).astype(np.int16)
+    joints = [f"point_{k}" for k in range(n)]
+    joints[:33] = Skeleton.mediapipe().joints if n in (33, 553) else joints[:33]
+    check(read_motion(put(tmp_path, npy(array), "a.npy")), array, joints)
+
+
+@pytest.mark.parametrize(
+    "array",
+    [np.ones((4, 3)), np.ones((4, 3, 4)), np.array([["a"]]), np.array([None]), np.ones((0, 2, 3))],
+)
+def test_other_arrays_are_refused(tmp_path, array):
+    message = r"a\.npy needs an array of numbers \(n_frames, n_joints, 2 or 3\)"
+    with pytest.raises(ValueError, match=message):
+        read_motion(put(tmp_path, npy(array), "a.npy"))
+
+
+@pytest.mark.parametrize(
+    ("scale", "told"),
+    [(1, None), (1e3, "1000"), (1e6, r"1e\+06"), (1e7, r"1e\+07"), (1e9, r"1e\+09")],
+)
+def test_times_without_a_unit_are_known_by_their_steps(tmp_path, scale, told):
+    values = tracked(40, 3).tolist()
+    rows = [[round(k / 30 * scale, 3), *row] for k, row in enumerate(values)]
+    path = put(tmp_path, table(["Timestamp", "Hip.X", "Hip.Y", "Hip.Z"], rows, "\t"), "a.tsv")
+    if told:
+        with pytest.warns(
+            UserWarning, match=rf"a\.tsv: the times of 'Timestamp' .* {told} a second"
+        ):
+            df = read_motion(path)
+    else:
+        df = read_motion(path)
+    assert df.attrs["frame_rate"] == pytest.approx(30, rel=1e-5)
+    check(df, np.array(values)[:, None], ["Hip"])
+
+
+@MISSING
+def test_kinect_with_states_and_anipose_with_errors(tmp_path):
+    columns = ["frame", "JOINT_HIP.x", "JOINT_HIP.y", "JOINT_HIP.z", "JOINT_HIP.TrackingState"]
+    rows = [[0, 1, 2, 3, "Tracked"], [1, 4, 5, 6, "Inferred"], [2, 0, 0, 0, "NotTracked"]]
+    path = put(tmp_path, table(columns, rows), "a.csv")
+    assert np.isnan(positions(read_motion(path))).any(axis=(1, 2)).tolist() == [False, False, True]
+    limited = read_motion(path, min_confidence=0.6, quality="keep")
+    assert np.isnan(limited["JOINT_HIP_x"]).tolist() == [False, True, True]
+    assert limited["JOINT_HIP_confidence"].tolist() == [1, 0.5, 0]
+    columns = [f"knee_{tail}" for tail in ("x", "y", "z", "error", "ncams", "score")]
+    df = read_motion(
+        put(tmp_path, table([*columns, "fnum"], [[1, 2, 3, 9, 3, 0.7, 0]] * 1), "b.csv")
+    )
+    check(df, np.array([[[1, 2, 3]]]), ["knee"])
+    assert df.attrs["left_out"] == "the columns ['knee_error', 'knee_ncams']"
+    assert (df.attrs["first_frame"], df.attrs["units"]) == (0, None)
+
+
+@MISSING
+def test_decimal_commas_quotes_units_blanks_and_texts(tmp_path):
+    text = '"Hip_x (mm)";"Hip_y (mm)";"note"\n1,5;2,25;"a;b"\n;4;c\n\n7,125;8;\n'
+    df = read_motion(put(tmp_path, text, "a.csv"))
+    check(df, np.array([[[1.5, 2.25]], [[np.nan, 4]], [[7.125, 8]]]), ["Hip"])
+    assert (df.attrs["units"], df.attrs["left_out"]) == ("mm", "the columns ['note']")
+
+
+def test_columns_that_are_no_joints_are_values(tmp_path):
+    df = read_motion(
+        put(tmp_path, table(["time (ms)", "knee", "EMG"], [[0, 1, 2], [20, 3, 4]]), "a.csv")
+    )
+    np.testing.assert_array_equal(df, [[1, 2], [3, 4]])
+    facts = {"kind": "values", "channels": ["knee", "EMG"], "frame_rate": 50.0, "format": "table"}
+    assert facts.items() <= df.attrs.items()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("hip_x,hip_y\n1,2\n3,b4\n", r", line 3: column 'hip_y' needs numbers, .* got 'b4'"),
+        ("hip_x,hip_y\n\n1,2\n3\n", r", line 4: a row needs 2 columns, .* got 1 \('3'\)"),
+        ("hip_x,hip_y\n1,2,3\n", r", line 2: a row needs 2 columns, .* got 3"),
+        ("hip_x,hip_y\n", "the file ends where frames should follow"),
+        ('hip_x,hip_y\n1,"2\n3,4\n', "holds rows that are no table"),
+        ("1,2\n3,4\n", "line 1: a header needs a name above each column"),
+        ("scorer,n,n\nbodyparts,a\ncoords,x,y\n0,1,2\n", "line 3: a header needs a name"),
+        ("name,note\na,b\n", "no column has numbers"),
+        ("frame,hip_x,hip_y\n0,1,2\n0,3,4\n", "frame 0 comes twice. If it holds several trials"),
+        ("frame,hip_x,hip_y\n0.5,1,2\n1,3,4\n", "frames need whole numbers"),
+        ("time,hip_x,hip_y\n1,1,2\n0,3,4\n", "times of 'time' must not decrease"),
+        ("frame,hip_x,hip_y\n0,1,2\n1,2,3\n99999999,3,4\n", "100000000 frames would take"),
+    ],
+)
+def test_wrong_tables_are_refused_with_the_place(tmp_path, text, message):
+    path = put(tmp_path, text, "a.csv")
+    with pytest.raises(ValueError, match=message) as caught:
+        read_motion(path)
+    assert str(caught.value).startswith(str(path))
