@@ -25,6 +25,7 @@ from .c3d import read_c3d
 from .gaps import POSITIONS, check_filling, fill_gaps, warn_of_gaps
 from .keypoints import KEYPOINT_FORMATS
 from .labs import QTM, VICON, read_motive, read_qtm, read_vicon
+from .mvnx import read_mvnx
 from .text import FARTHEST, make_unique, read_storage
 from .trc import read_trc
 
@@ -85,6 +86,7 @@ FORMATS = [
     MotionFormat(None, (".c3d",), lambda path, head: head[1:2] == b"\x50", read_c3d),
     MotionFormat(None, (".trc",), lambda path, head: head.startswith(b"PathFileType"), read_trc),
     MotionFormat(None, (".mot", ".sto"), lambda path, head: False, read_storage),
+    MotionFormat(None, (".mvnx",), lambda path, head: b"<mvnx" in head, read_mvnx),
     MotionFormat("vicon", (".csv",), lambda path, head: bool(VICON.search(head)), read_vicon),
     MotionFormat("qtm", (".tsv",), lambda path, head: bool(QTM.match(head)), read_qtm),
     MotionFormat(
