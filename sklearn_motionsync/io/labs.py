@@ -23,6 +23,7 @@ from .text import (
     read_rate,
     read_timed_rows,
     split_fields,
+    split_rows,
     split_subjects,
 )
 
@@ -33,37 +34,24 @@ def _cells(row, separator=b","):
 
 def _read_columns(text, rows, columns, n, time_column, separator=b",", what="time"):
     """The numbers in columns of `n`, NaN where a cell is blank, and the decimals of the times."""
-    pick = operator.itemgetter(*columns)
-
-    def picked():
-        for row in rows:
-            cells = row.split(separator)
-            missing = n - len(cells)
-            if missing > 0 and missing % 3 == 0 and text.is_whole:
-                cells += [b""] * missing  # of markers at its end
-            elif missing > 0 or b"".join(cells[n:]).strip():
-                got = f"{len(cells)} ({quote([row])})"
-                raise text.error(f"a row needs {counted(n, 'cell')}, got {got}.")
-            yield pick(cells)
-
-    frames, decimals = read_timed_rows(text, picked(), time_column, what)
+    picked = map(operator.itemgetter(*columns), split_rows(text, rows, n, separator))
+    frames, decimals = read_timed_rows(text, picked, time_column, what)
     return np.frombuffer(b"".join(frames)).reshape(len(frames), -1).copy(), decimals
 
 
 def _as_positions(names, values, known=None):
     joints, subjects = split_subjects(names, known)
-    positions = values.reshape(len(values), len(joints), -1)[:, :, :3].copy()
     facts = {"joints": joints, "subjects": subjects, "parents": [-1] * len(joints)}
-    return facts | {"positions": positions}
+    return facts | {"positions": values.reshape(len(values), len(joints), -1)[:, :, :3].copy()}
 
 
 # -- Vicon Nexus: sections below each other, each with its rate, names, axes, units and rows -------
 
 VICON = re.compile(
-    rb'(?im)^"?(?:frame"? *[,;\t] *"?sub ?frame|(?:model outputs|trajectories|devices|joints|'
+    rb'(?im)^\s*"?(?:frame"? *[,;\t] *"?sub ?frame|(?:model outputs|trajectories|devices|joints|'
     rb'segments|events|gait cycle parameters)"?[,;\t ]*\r?\n"?(?:\d|subject))'
 )
-_AXES_ROW = re.compile(rb'(?i)"?(?:frame|field ?#)"? *([,;\t])')
+_AXES_ROW = re.compile(rb'(?i)\s*"?(?:frame|field ?#)"? *([,;\t])')
 # Model outputs by their unit; where it is blank, their names end so.
 _OUTPUTS = {
     "angles": "deg|rad",
@@ -90,7 +78,7 @@ def read_vicon(path, *, group="markers"):
         if at is not None:
             head = [_cells(line, separator) for *_, line in lines[: at + 2]]
             names, axes, units = head[at - 1] if at else [], head[at], head[-1]
-            units = [] if units[0] or units is axes else units
+            units = [] if units[0] else units  # a row of numbers
             table = read_rate(head[0][0]) if at > 1 else None, axes, lines[at + 1 + bool(units) :]
             for kind, found in _sort_columns(title.lower(), names, axes, units, others).items():
                 number = sum(key.partition("_")[0] == kind for key in members) + 1
@@ -102,16 +90,14 @@ def read_vicon(path, *, group="markers"):
     groups = {}
     for name, ((rate, *_), of) in members.items():
         units = [unit for *_, unit in of]
-        same = units[0] if len(set(units)) == 1 else None
-        units = units if name.startswith("analog") else same
+        if not name.startswith("analog"):
+            units = units[0] if len(set(units)) == 1 else None
         groups[name] = {"n": len(of), "units": units, "frame_rate": rate}
     check_group(path, groups, group)
     (rate, axes, lines), of = members[group]
-    columns = [j for _, at, _ in of for j in at]
     n_first = 1 + axes[1].lower().startswith(b"sub")
-    text.check_size(len(lines), len(columns) // 3 + 1)
+    columns = [*range(n_first), *(j for _, at, _ in of for j in at)]
     rows = (line for text.line_number, text.is_whole, line in lines)
-    columns = [*range(n_first), *columns]
     values, _ = _read_columns(text, rows, columns, len(axes), 0, separator, "frame")
     times = _read_times(text, values[:, :n_first], rate)
     facts = {
@@ -218,8 +204,8 @@ def _read_times(text, numbers, rate):
     times = ((numbers[:, 0] - 1) * per_frame + sub) / (rate or 1)
     if not (sub.min() >= 0 and per_frame <= _MOST_SUB_FRAMES and (np.diff(times) >= 0).all()):
         raise text.error(
-            f"the Sub Frames of a frame must count from 0 to {_MOST_SUB_FRAMES} at most, got "
-            f"{sub.min():g} to {sub.max():g}, or not in order."
+            f"Sub Frames must rise from 0 to at most {_MOST_SUB_FRAMES}, got {sub.min():g} to "
+            f"{sub.max():g}, or another order."
         )
     return times
 
@@ -253,7 +239,7 @@ def read_qtm(path):
             f"{quote([contents])} and {quote(list(header))}."
         )
     leads, n = (2, 0), len(names)
-    if fields and not any(re.match(rb"[-+.\d]", field) for field in fields):
+    if fields and not any(re.fullmatch(rb"[-+.\deE]+", field) for field in fields):
         # The names of the columns.
         leads = (sum(field.lower() in (b"frame", b"time") for field in fields[:2]),)
         row = text.row(b"\n")
@@ -265,16 +251,14 @@ def read_qtm(path):
             f"Frame and Time or without both; got {len(split_fields(row))} columns."
         )
     lead, size = fitting[0]
-    rows = itertools.chain([row], iter(lambda: text.row(None if lead else b"\n"), b""))
+    rows = itertools.chain([row] * bool(row), iter(lambda: text.row(None if lead else b"\n"), b""))
     values, decimals = _read_columns(text, rows, range(size), size, 1 if lead else None, b"\t")
     for of, stated, what in ((len(values), b"NO_OF_FRAMES", "frame"), (n, number, noun)):
         if stated in header:
             word = b" ".join(header[stated])
             text.check_count(of, text.count(word, decode(stated)), decode(stated), what)
-    rate, entries = read_rate(b" ".join(header.get(b"FREQUENCY", []))), []
-    for label, *at in marks:
-        frame, time = numbers_or_nan(text, at)
-        entries.append((decode(label), "", (frame - 1) / (rate or 1) if math.isnan(time) else time))
+    rate = read_rate(b" ".join(header.get(b"FREQUENCY", [])))
+    entries = [(decode(label), "", *numbers_or_nan(text, [at])) for label, _, at in marks]
     facts = _as_positions(names, values[:, lead:])
     hide_unseen(facts["positions"])
     if lead:
@@ -327,14 +311,12 @@ def read_motive(path, *, group=None):
     check_group(path, groups, group, [noun for noun, n in others.items() if n])
     if group == "joints" and facts.get(b"Coordinate Space", b"").lower() == b"local":
         raise text.error("positions are those in the parent bone; export them as Global.")
-    names, columns, _, _ = zip(*members[group], strict=True)
-    columns = [0, 1, *(j + k for j in columns for k in range(3))]
+    columns = [0, 1, *(j + k for _, j, *_ in members[group] for k in range(3))]
     values, decimals = _read_columns(text, iter(text.row, b""), columns, len(axes), 1)
-    stated = facts.get(b"Total Exported Frames", b"")
-    n_stated = int(stated) if stated.isdigit() else None
-    text.check_count(len(values), n_stated, "Total Exported Frames")
+    if stated := facts.get(key := b"Total Exported Frames"):
+        text.check_count(len(values), text.count(stated, decode(key)), decode(key))
     known = [name for of in members.values() for name, *_ in of]
-    motion = _as_positions(names, values[:, 2:], known)
+    motion = _as_positions([name for name, *_ in members[group]], values[:, 2:], known)
     return motion | {
         "parents": _read_parents(text, members[group], motion["subjects"]),
         "times": values[:, 1].copy(), "decimals": decimals, "frame_rate": rate,
@@ -349,8 +331,7 @@ def _read_parents(text, members, subjects):
     at = {name: j for j, (name, *_) in enumerate(members)}
     at |= {(subjects[j], name.rpartition(":")[2]): j for j, (name, *_) in enumerate(members)}
     at |= {(subjects[j], mark): j for j, (_, _, mark, _) in enumerate(members) if mark}
-    words = [(subjects[j], parent) for j, (*_, parent) in enumerate(members)]
-    parents = [at.get(word, at.get(word[1], -1)) for word in words]
+    parents = [at.get((subjects[j], x), at.get(x, -1)) for j, (*_, x) in enumerate(members)]
     parents = [-1 if parent == j else parent for j, parent in enumerate(parents)]
     if find_cycle(parents):
         raise text.error("the row of parents has a bone that is below itself.")

@@ -142,8 +142,7 @@ class MotionText:
     def check_count(self, n, n_stated, name, noun="frame"):
         """Warn, in the caller of `read_motion`, if a file states another number than it has.
 
-        What is there is read. Where the last line has no end, frames may have been lost with it,
-        and the file is refused.
+        It is refused if its last line has no end, with which frames may have been lost.
         """
         if n_stated in (None, n):
             return
@@ -248,6 +247,27 @@ def split_fields(row, n=None):
     while n is not None and len(fields) > n and not fields[-1]:
         fields.pop()
     return fields
+
+
+def split_rows(text, rows, n, separator=None):
+    """The `n` fields of each row, by default as `split_fields` finds them.
+
+    Those of markers at its end may be absent from a whole line; they are blank.
+    """
+    for i, row in enumerate(rows):
+        fields = row.split(separator) if separator else split_fields(row, n)
+        missing = n - len(fields)
+        has_gaps = missing % 3 == 0 and (separator or b"\t" in row) and text.is_whole
+        if (missing > 0 and not has_gaps) or b"".join(fields[n:]).strip():
+            raise text.error(
+                f"a row needs {n} fields, got {len(fields)} ({quote([row])}). A marker that was "
+                "not seen is left blank, between as many separators."
+            )
+        if missing > 0:
+            # They take no bytes of the file.
+            text.check_size(i, n // 3)
+            fields = fields + [b""] * missing
+        yield fields
 
 
 def read_timed_rows(text, rows, time_column, what="time"):
@@ -387,8 +407,7 @@ def _common_prefix(names):
 def describe_events(entries, rate, start):
     """Events by time, of (label, context, time); `start` is the number of the first frame, from 0.
 
-    Each is a dict of its label, its context, its time in seconds of the trial, and its frame
-    in the recording, from 0; None where the frame rate is not known.
+    The frame of an event is that of the recording, from 0; None where no frame rate is known.
     """
     events = [
         {

@@ -1,5 +1,6 @@
 """TRC: markers in columns of text, as OpenSim, Pose2Sim, Cortex and Vicon write them."""
 
+import itertools
 import math
 import re
 
@@ -14,6 +15,7 @@ from .text import (
     read_rate,
     read_timed_rows,
     split_fields,
+    split_rows,
     split_subjects,
 )
 
@@ -30,14 +32,11 @@ def read_trc(path):
         )
     header = _read_header(text)
     names, row = _read_names(text, header)
-    rows = _split_rows(text, row, len(names))
-    frames, decimals = read_timed_rows(text, rows, time_column=1)
+    n = 2 + 3 * len(names)
+    rows = itertools.chain([row] * bool(row), iter(text.row, b""))
+    frames, decimals = read_timed_rows(text, split_rows(text, rows, n), time_column=1)
     text.check_count(len(frames), header["numframes"], "NumFrames")
-    # Blank columns at the end of a row take no bytes of the file.
-    text.check_size(len(frames), len(names))
-    values = np.full((len(frames), 2 + 3 * len(names)), np.nan)
-    for i, frame in enumerate(frames):
-        values[i, : len(frame)] = frame
+    values = np.frombuffer(b"".join(frames)).reshape(len(frames), n)
     text.check_count(len(names), header["nummarkers"], "NumMarkers", "marker")
     names, subjects = split_subjects(names)
     number = values[0, 0]
@@ -45,7 +44,7 @@ def read_trc(path):
         "joints": names,
         "subjects": subjects,
         "parents": [-1] * len(names),
-        "positions": hide_unseen(values[:, 2:].reshape(len(frames), -1, 3)),
+        "positions": hide_unseen(values[:, 2:].reshape(len(frames), -1, 3).copy()),
         "times": values[:, 1].copy(),
         "decimals": decimals,
         "frame_rate": header["datarate"],
@@ -109,19 +108,3 @@ def _read_names(text, header):
             )
         names = [name or b"marker_%d" % (j + 1) for j, name in enumerate(places)]
     return [decode(name) for name in names], row
-
-
-def _split_rows(text, row, n_markers):
-    """The fields of every frame; those of markers at its end may be missing."""
-    n = 2 + 3 * n_markers
-    while row:
-        fields = split_fields(row, n)
-        may_be_short = b"\t" in row and text.is_whole and len(fields) % 3 == 2
-        if len(fields) != n and not (may_be_short and len(fields) < n):
-            raise text.error(
-                f"a frame needs its number, its time and 3 numbers for each of {n_markers} "
-                f"markers, {n} in all, got {len(fields)} ({quote(fields)}). A marker that was not "
-                "seen is left blank between its tabs."
-            )
-        yield fields
-        row = text.row()

@@ -117,7 +117,7 @@ def test_blank_cells_of_nexus_are_hidden_markers(tmp_path, blank):
     with pytest.warns(UserWarning, match=r"of 2 of 3 markers"):
         np.testing.assert_array_equal(read(tmp_path, "\n".join(lines)), values)
     cut = "\n".join(lines[:10])
-    with pytest.raises(ValueError, match=r"a\.csv, line 10: a row needs 11 cells, got 8"):
+    with pytest.raises(ValueError, match=r"a\.csv, line 10: a row needs 11 fields, got 8"):
         read(tmp_path, cut)
 
 
@@ -185,7 +185,7 @@ def test_counts_of_qtm_that_contradict_the_rows_are_warnings(tmp_path):
     for change, message in (
         (("\tSACR\n", "\n"), "MARKER_NAMES names 2, each with 3 columns, .* got 11 columns"),
         (("DATA_INCLUDED\t3D", "DATA_INCLUDED\tAngle"), "expected DATA_INCLUDED 3D .* got 'Angle'"),
-        (("\n3\t0.02000\t", "\n3\t0.02000\t7\t"), "line 12: a row needs 11 cells, got 12"),
+        (("\n3\t0.02000\t", "\n3\t0.02000\t7\t"), "line 12: a row needs 11 fields, got 12"),
         (("\n3\t0.02000\t", "\n3\t0.00500\t"), "line 12: the time of a row must be a number"),
     ):
         with pytest.raises(ValueError, match=rf"a\.tsv, line \d+: .*{message}|a\.tsv, {message}"):
@@ -266,7 +266,7 @@ def test_skeleton_of_motive_is_made_of_its_bones(tmp_path):
             "positions are those in the parent bone; export them as G",
         ),
         (('Parent,"0"', 'Parent,"3"'), None),
-        (("\n9,0.075000,", "\n9,0.075000,7,"), "line 18: a row needs 23 cells, got 24"),
+        (("\n9,0.075000,", "\n9,0.075000,7,"), "line 18: a row needs 23 fields, got 24"),
         (("\n9,0.075000,", "\n9,x,"), "line 18: a frame needs numbers, .* got 'x"),
     ],
 )

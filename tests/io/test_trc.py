@@ -116,10 +116,10 @@ def test_rows_may_end_behind_a_marker_but_the_last(tmp_path):
     np.testing.assert_array_equal(df, positions.reshape(40, 9))
     for n in (1, 2):
         cut = [*lines[:30], "\t".join(lines[30].split("\t")[:-n]), *lines[31:]]
-        with pytest.raises(ValueError, match=r"line 31: a frame needs its number, its time and 3"):
+        with pytest.raises(ValueError, match=r"line 31: a row needs 11 fields, got"):
             read(tmp_path, "\n".join(cut))
     whole = TEXT.split("\n")
-    with pytest.raises(ValueError, match=r"line 46: .* 11 in all, got 8"):
+    with pytest.raises(ValueError, match=r"line 46: a row needs 11 fields, got 8"):
         read(tmp_path, "\n".join([*whole[:45], "\t".join(whole[45].split("\t")[:-3])]))
 
 
@@ -176,7 +176,7 @@ def test_contradiction_of_rate_and_times_is_a_warning(tmp_path):
         (("\tZ3", ""), "line 5: expected X1 Y1 Z1"),
         (("\n9\t0.160\t", "\n9\t\t"), "line 15: the time of a row must be a number"),
         (("\n9\t0.160\t", "\n9\t0.130\t"), "line 15: .* got 0.13 after 0.14"),
-        (("\n9\t0.160\t", "\n9\t0.160\t7\t"), "line 15: .* 11 in all, got 12"),
+        (("\n9\t0.160\t", "\n9\t0.160\t7\t"), "line 15: a row needs 11 fields, got 12"),
         (("\n9\t0.160\t", "\n9\t0.160\tx"), "line 15: a frame needs numbers, or nothing .* got 'x"),
         (("\n9\t0.160\t", "\n9\t0.160\t1_"), "got '1_"),
         (("\n9\t0.160\t", "\n9\t0.1_60\t"), "line 15: a frame needs numbers, .* got '0.1_60'"),
