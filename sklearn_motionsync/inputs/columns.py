@@ -14,7 +14,7 @@ _CONFIDENCE = [
     *("prob", "certainty", "quality", "tracking[ _]?state", "state", "presence", "[vcps]"),
 ]
 # The axes, w of a quaternion, the confidence, and errors, of which larger ones are worse.
-_TAIL = rf"(?P<tail>[xyzw]|{'|'.join(_CONFIDENCE)}|error|residual|n_?cams)"
+_TAIL = rf"(?P<tail>[xyzw]|{'|'.join(_CONFIDENCE)}|error|residual|inferred|n_?cams)"
 _BETWEEN = r"[\s_.:;/|-]"
 _UNIT = r"(?:[\s_]*[\s_\[(](?P<unit>mm|cm|m|px|pixels?)[\])]?)?"
 # LASI_x, LASI X, LASI:X, LASI[x], LASI.x (mm); x_LASI, X LASI; LASIX, noseX; x0.

@@ -197,8 +197,11 @@ def _assemble(cells, frame=None, **facts):
         taken = [*columns.places.flat, *columns.confidence]
     else:
         taken = [x for x in columns.rest if x not in (frame, time) and not cells.is_text(x)]
-    if not taken:
-        raise ValueError(f"{cells.path}: no column has numbers, of {listed(labels)}.")
+    texts = [labels[x] for x in columns.rest if cells.is_text(x)]
+    if not taken or (not columns.joints and len(texts) > len(taken)):
+        raise ValueError(
+            f"{cells.path} is no recording, most of its columns are text: {listed(texts)}."
+        )
     left = [str(labels[x]) for x in range(len(labels)) if x not in {*taken, frame, time, subject}]
     facts |= {"left_out": f"the columns {listed(left)}"} if left else {}
     blank = np.full(len(cells.table), np.nan)

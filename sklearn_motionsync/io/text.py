@@ -575,7 +575,7 @@ def read_cells(path, n_header=1):
         if b'"' not in row and not row.rstrip(separator).count(separator) < n <= n_cells:
             raise text.error(
                 f"a row needs {counted(n, 'column')}, as the header has, got {n_cells} "
-                f"({quote([row])}); the file is not complete, or the line is wrong."
+                f"({quote([row])}). The file is not complete, or does not begin with names."
             )
         rows.append(row)
         lines.append(text.line_number)
