@@ -52,8 +52,7 @@ def read_c3d(path, *, group=None):
     }
     if segments.n:
         segments_rate = None if rate is None else rate * segments.per_frame
-        units = groups["markers"]["units"]
-        groups["segments"] = {"n": segments.n, "units": units, "frame_rate": segments_rate}
+        groups["segments"] = groups["markers"] | {"n": segments.n, "frame_rate": segments_rate}
     if frames and frames.n_analog:
         n_channels = frames.n_analog // per_frame
         units = (parameters.texts("ANALOG", "UNITS") + [""] * n_channels)[:n_channels]
@@ -84,14 +83,13 @@ def read_c3d(path, *, group=None):
         values = _read_analog(frames, parameters, n_channels)
         return facts | {"channels": make_unique(channels), "values": values}
     if group == "segments":
-        joints = make_unique(segments.labels)
-        return facts | {
-            "joints": joints, "parents": [-1] * len(joints), "positions": segments.read_origins()
-        }  # fmt: skip
-    points = members[group][0]
-    positions = _read_points(frames, points, computed=group != "markers")
-    joints, subjects = split_subjects([labels[i] for i in points], labels)
-    facts |= {"joints": joints, "subjects": subjects, "parents": [-1] * len(points)}
+        positions, labels = segments.read_origins(), segments.labels
+        joints, subjects = split_subjects(labels, labels)
+    else:
+        points = members[group][0]
+        positions = _read_points(frames, points, computed=group != "markers")
+        joints, subjects = split_subjects([labels[i] for i in points], labels)
+    facts |= {"joints": joints, "subjects": subjects, "parents": [-1] * len(joints)}
     return facts | {"positions": positions}
 
 
@@ -282,8 +280,8 @@ class _Segments:
         end = file.data_start if file.data_start > self.start else len(file.data)
         if not file.first_parameter < self.start < len(file.data):
             raise file.error(
-                f"ROTATION:DATA_START says that rotations begin at byte {self.start}; they must "
-                f"lie behind byte {file.first_parameter} and before the end at {len(file.data)}"
+                f"ROTATION:DATA_START says byte {self.start}, and the rotations must begin between "
+                f"{file.first_parameter} and {len(file.data)}"
             )
         stated = {n * self.per_frame for n in _stated_frames(file, self._parameters)}
         stated = [*_whole([self._parameters.number("ROTATION", "FRAMES", 0)]), *sorted(stated)]

@@ -236,8 +236,9 @@ def read_motion(
             decimals=motion.pop("decimals"),
             frame_rate=frame_rate,
         )
-    else:
-        _set_clock(motion, frame_rate)
+    elif frame_rate is not None:
+        motion["frame_rate"] = float(frame_rate)
+    _set_clock(motion, is_new=frame_rate is not None)
     df = _to_frame(motion, path, known)
     if max_gap or ends != "keep":
         df = fill_gaps(df, max_gap, ends=ends)
@@ -249,18 +250,13 @@ def read_motion(
     return _with_confidence(df, confidence) if is_wanted else df
 
 
-def _set_clock(motion, frame_rate):
-    """The frame rate of frames without times, and with it the time of the first and of events.
-
-    Frames are what a file counts. At another rate they are at other times.
-    """
-    if frame_rate is not None:
-        motion["frame_rate"] = float(frame_rate)
+def _set_clock(motion, is_new):
+    """The time of the first frame; at a new frame rate events are at other times too."""
     if (rate := motion["frame_rate"]) is None:
         return
     motion["first_time"] = first_time_of(motion) or 0.0
     for event in motion.get("events", ()):
-        if frame_rate is not None and event["frame"] is not None:
+        if is_new and event["frame"] is not None:
             event["time"] = round(motion["first_time"] + event["frame"] / rate, 6)
 
 

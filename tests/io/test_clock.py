@@ -17,7 +17,7 @@ from sklearn_motionsync.io import (
     write_motion,
 )
 
-from motion_files import AMC, ASF, body, c3d, floats, put, storage, texts, trc, words
+from motion_files import AMC, ASF, EXAMPLES, body, c3d, floats, put, storage, texts, trc, words
 
 FIRST, RATE, N = 695, 50.0, 60
 SECONDS = (FIRST - 1 + np.arange(N)) / RATE
@@ -138,6 +138,17 @@ def test_gait_events_have_the_seconds_of_the_events_of_the_file(tmp_path, rows):
     df = read_motion(path)
     del df.attrs["first_time"]
     assert gait_events(df.iloc[rows], walk.skeleton).equals(found)
+
+
+@pytest.mark.parametrize("frame_rate", [None, 25])
+@pytest.mark.parametrize("key", ["c3d", "vicon", "qtm"])
+def test_events_of_every_format_are_at_the_seconds_of_their_frames(tmp_path, key, frame_rate):
+    path, *_ = [put(tmp_path, content, name) for name, content in EXAMPLES[key]().items()]
+    attrs = read_motion(path, frame_rate=frame_rate, max_gap=9).attrs
+    assert attrs["events"]
+    for event in attrs["events"]:
+        seconds = attrs["first_time"] + event["frame"] / attrs["frame_rate"]
+        assert event["time"] == pytest.approx(seconds, abs=2e-5)
 
 
 def test_another_rate_sets_the_times_of_frames_anew(tmp_path):
