@@ -43,13 +43,13 @@ def read_c3d(path, *, group=None):
     frames = None
     if n_points or any(n_stated):
         frames = _Frames(file, parameters, segments, n_points, n_stated, per_frame)
-    group = group or ("markers" if n_points or not segments.n else "segments")
     labels = _read_labels(parameters, "POINT", n_points, "marker")
     members = _read_point_groups(parameters, labels)
     groups = {
         name: {"n": len(points), "units": units, "frame_rate": rate}
         for name, (points, units) in members.items()
     }
+    group = group or ("segments" if segments.n and not groups["markers"]["n"] else "markers")
     if segments.n:
         segments_rate = None if rate is None else rate * segments.per_frame
         groups["segments"] = groups["markers"] | {"n": segments.n, "frame_rate": segments_rate}

@@ -120,6 +120,14 @@ def test_a_file_of_rotations_gives_the_origins_of_its_segments(tmp_path, machine
         read_motion(tmp_path / "a.c3d", group="markers")
 
 
+def test_a_file_of_angles_and_rotations_gives_its_segments(tmp_path):
+    others, changes = {"ROTATION": rotation_parameters()}, {"ANGLES": texts("M0", "M1", "M2")}
+    content = c3d(tracks(), changes=changes, others=others, rotations=poses())
+    df = read_motion(put(tmp_path, content, "a.c3d"))
+    np.testing.assert_array_equal(df.to_numpy().reshape(40, 2, 3), poses()[..., 12:15])
+    assert df.attrs["left_out"] == "3 angles, the rotations of 2 segments"
+
+
 @pytest.mark.parametrize("ratio", [None, 1, 2])
 def test_markers_and_rotations_are_two_groups(tmp_path, ratio):
     rows = 40 * (ratio or 1)
