@@ -23,6 +23,7 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .axes import fill_heading, heading_axes, to_y_up
+from .columns import check_columns, plain_positions
 from .formats import LANDMARKS, SIDES
 from .limbs import (
     LATERAL_LIMBS,
@@ -36,7 +37,6 @@ from .limbs import (
     median_lengths,
     scale_missing_lengths,
 )
-from .skeleton import check_columns
 from .upright import check_upright
 
 __all__ = ["Body", "PositionsTransformer", "mask_hidden"]
@@ -239,7 +239,8 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
-            Joint positions, joint by joint x, y, z; or x, y.
+            Joint positions, joint by joint x, y, z; or x, y. Arrays may have an axis of joints,
+            (n_frames_i, n_joints, n_dims), and tables the spellings of `Skeleton.from_frame`.
         y : ignored
             Present for API consistency.
 
@@ -278,7 +279,8 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
-            Joint positions, joint by joint x, y, z; or x, y.
+            Joint positions, joint by joint x, y, z; or x, y. Arrays may have an axis of joints,
+            (n_frames_i, n_joints, n_dims), and tables the spellings of `Skeleton.from_frame`.
 
         Returns
         -------
@@ -344,8 +346,9 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin
 
     def _check(self, X, *, reset):
         finite = self._finite
-        trials = check_input(self, X, reset=reset, level="pose", finite=finite)
         skeleton = self.skeleton
+        X = plain_positions(X, skeleton)
+        trials = check_input(self, X, reset=reset, level="pose", finite=finite)
         # Tables have their columns in the order of fit; if it had none, in that of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
         names = names_of_input(self) or column_names(first)

@@ -13,10 +13,11 @@ from ..inputs.numbers import as_numbers, column_names
 from ..inputs.tables import as_pandas
 from ..inputs.types import Transformed, TrialsLike
 from .axes import UP_AXES, heading_axes, to_y_up
+from .columns import check_columns, columns_of_skeleton, plain_positions
 from .formats import AXES, LANDMARKS
 from .landmarks import as_tuple, other_side
 from .limbs import LATERAL_LIMBS, LIMBS, unit_vectors
-from .skeleton import Skeleton, check_columns
+from .skeleton import Skeleton
 
 __all__ = ["exchange_of_sides", "mirror"]
 
@@ -34,7 +35,8 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
     Parameters
     ----------
     X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, 2-D array or DataFrame
-        Joint positions, one or several trials; gaps may be NaN.
+        Joint positions, one or several trials; gaps may be NaN. Arrays may have an axis of joints,
+        (n_frames_i, n_joints, n_dims), and tables the spellings of `Skeleton.from_frame`.
     skeleton : Skeleton
         The joints. Left and right joints are exchanged: those at a left and a right landmark, then
         those whose names differ by "left" and "right", or "L" and "R". All others are in the
@@ -75,7 +77,7 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
         )
     counterparts, alone = _counterparts(skeleton)
     # One array of several trials is mirrored as a whole.
-    whole = isinstance(X, pd.DataFrame) or getattr(X, "ndim", 1) == 3
+    whole = isinstance(X, pd.DataFrame) or getattr(X, "ndim", 1) > 2
     one = whole or as_collection(X) is None
     sequences: Any = [X] if one else X
     parts = list(sequences)
@@ -84,7 +86,7 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
     arrays = [_as_positions(x, skeleton, i) for i, x in enumerate(parts)]
     _check_middle(arrays, skeleton, alone)
     mirrored = [
-        _as_kind_of(x, _mirror_array(array, skeleton, counterparts))
+        _as_kind_of(x, _mirror_array(array, skeleton, counterparts), skeleton, counterparts)
         for x, array in zip(parts, arrays, strict=True)
     ]
     return mirrored[0] if one else mirrored
@@ -93,7 +95,7 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
 def _as_positions(x, skeleton, i):
     """Positions (..., n_joints, n_dims) of one trial, or of several in one array."""
     what = f"Trial {i}"
-    x = as_pandas(x)
+    x = plain_positions(as_pandas(x), skeleton)
     check_columns(column_names(x) or (), skeleton, what)
     array = as_numbers(x, what)
     width = skeleton.n_dims * len(skeleton.joints)
@@ -112,16 +114,25 @@ def _mirror_array(array, skeleton, counterparts):
     return out.reshape(*array.shape[:-2], -1)
 
 
-def _as_kind_of(x, array):
+def _as_kind_of(x, array, skeleton, counterparts):
     """An array in the container that was given."""
-    if x is not as_pandas(x):
-        # Polars, which need not be installed.
-        return type(x)(dict(zip(x.columns, array.T, strict=True)))
-    if not isinstance(x, pd.DataFrame):
-        return array
-    df = pd.DataFrame(array, index=x.index, columns=x.columns)
-    df.attrs = dict(x.attrs)
-    return df
+    table = as_pandas(x)
+    if not isinstance(table, pd.DataFrame):
+        return array.reshape(np.shape(x))
+    fitting = columns_of_skeleton(table, skeleton)
+    df = pd.DataFrame(array, index=table.index)
+    if fitting is not None:
+        # Columns beside the positions stay, but for the confidence, which goes with its joint.
+        df, values = table.copy(), dict(zip(fitting.places.ravel(), array.T, strict=True))
+        of_other = [fitting.confidence[k] for k in counterparts]
+        pairs = zip(fitting.confidence, of_other, strict=True)
+        values |= {to: table.iloc[:, k].to_numpy() for to, k in pairs if min(to, k) >= 0}
+        for place, column in values.items():
+            df.isetitem(place, column)
+    df.columns = table.columns
+    df.attrs = dict(table.attrs)
+    # Polars need not be installed.
+    return df if x is table else type(x)({name: df[name].to_numpy() for name in x.columns})
 
 
 # -- the counterpart of each joint --------------------------------------------------------

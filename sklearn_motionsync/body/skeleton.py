@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, Self
@@ -13,16 +14,25 @@ from ..inputs.numbers import as_numbers, is_integer
 from ..inputs.types import UpAxis
 from ..inputs.wording import counted
 from .axes import UP_AXES
-from .formats import AXES, FORMATS, LANDMARKS
-from .landmarks import add_midpoints, as_tuple, guess_landmarks, missing_counterparts
-from .limbs import LIMBS, complete_legs, features_of_parts, limbs_between
+from .columns import joint_columns
+from .formats import AXES, FORMATS, LANDMARKS, SIDES
+from .landmarks import (
+    add_midpoints,
+    as_tuple,
+    guess_landmarks,
+    missing_counterparts,
+    nearest_names,
+)
+from .limbs import LIMBS, complete_legs, features_of_parts, landmark_positions, limbs_between
 from .upright import estimate_up
 
-__all__ = ["Skeleton", "check_columns", "find_cycle", "loose_joints", "parse_joint_columns"]
+__all__ = ["Skeleton", "find_cycle", "loose_joints"]
 
 # A root that moves less than this share of the largest coordinate stands still, and the length of a
 # bone that changes less does not.
 _STILL = 1e-4
+# Limbs are crossed in this share of frames if sides are exchanged; people cross them for less.
+_CROSSED = 0.95
 
 
 class _ReadOnly(dict):
@@ -203,11 +213,13 @@ class Skeleton:
         Parameters
         ----------
         df : DataFrame (n_frames, 3 * n_joints), or (n_frames, 2 * n_joints)
-            Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint, or ``<joint>_x``,
-            ``<joint>_y`` of key-points in a picture. If ``df.attrs`` has ``joints`` and
-            ``parents``, the parent of a joint is its nearest ancestor that has columns; otherwise
-            every joint is a root. So is a joint whose parent is no landmark and stands still while
-            the joint moves away from it, as the roots of some retargeted takes do.
+            Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, or ``<joint>_x``, ``<joint>_y`` of
+            key-points in a picture, also in the spellings of other programs, such as ``<joint> X``,
+            ``<joint>:X``, or a `MultiIndex`. Columns of their quality are left out. If ``df.attrs``
+            has ``joints`` and ``parents``, the parent of a joint is its nearest ancestor that has
+            columns; otherwise every joint is a root. So is a joint whose parent is no landmark and
+            stands still while the joint moves away from it, as the roots of some retargeted takes
+            do.
         landmarks : mapping of str to str or tuple of str, default=None
             The joints of some or all landmarks, several for their mean; the others are guessed from
             the names. None as a joint leaves a landmark out.
@@ -225,7 +237,7 @@ class Skeleton:
         Raises
         ------
         ValueError
-            If the columns are not such triples or pairs, the names give no limb, or a
+            If the columns are no such positions, the names give no limb, or a
             landmark on one side only. For an array without columns use
             ``Skeleton(joints, parents)``.
 
@@ -240,7 +252,9 @@ class Skeleton:
         >>> Skeleton.from_frame(legs, landmarks={"pelvis": ("left_hip", "right_hip")}, up="z")
         Skeleton(<12 joints, 14 of 15 landmarks>, up='z')
         """
-        joints, n_dims = parse_joint_columns(df)
+        columns = joint_columns(df)
+        joints = columns.joints
+        n_dims: Literal[3, 2] = 2 if len(columns.axes) == 2 else 3
         if twice := sorted({joint for joint in joints if joints.count(joint) > 1}):
             raise ValueError(
                 f"The columns of the joints {twice} are repeated; use "
@@ -250,18 +264,29 @@ class Skeleton:
         attrs = getattr(df, "attrs", {})
         names = _as_joints(attrs.get("joints", ()))
         # Renamed columns are not joints of the file.
-        guess = guess_landmarks(joints, names if set(joints) <= set(names) else ())
+        names_of_file = names if set(joints) <= set(names) else ()
+        guess = guess_landmarks(joints, names_of_file, clusters=not named)
+        positions = _positions_of(df, columns)
+        if positions is not None:
+            # Of the markers of a static trial, those that were taken off stand for nothing.
+            never = np.isnan(positions).any(axis=2).all(axis=0)
+            seen = [joint for joint, is_never in zip(joints, never, strict=True) if not is_never]
+            if 0 < len(seen) < len(joints):
+                guess |= guess_landmarks(seen, names_of_file, clusters=False)
         all_landmarks = _check_landmarks(add_midpoints(guess | named), named, joints)
         parents = _nearest_parents(joints, names, _as_parents(attrs.get("parents", ())))
         held = {joint for at in all_landmarks.values() for joint in as_tuple(at)}
-        parents = _without_still_roots(df, joints, parents, held)
+        parents = _without_still_roots(positions, joints, parents, held)
         up = attrs.get("up") if up is None else up
         skeleton = cls(joints, parents, all_landmarks, "y" if up is None else up, n_dims)
-        positions = _positions_of(df) if up is None else None
-        estimate = None if positions is None else estimate_up(positions, skeleton)
-        return (
-            skeleton if estimate is None else cls(joints, parents, all_landmarks, estimate, n_dims)
-        )
+        if positions is not None:
+            if not named and all(guess != known.landmarks for known in FORMATS.values()):
+                _warn_of_sides(positions, skeleton)
+            flat = positions.reshape(len(positions), -1)
+            estimate = estimate_up(flat, skeleton) if up is None else None
+            if estimate is not None:
+                skeleton = cls(joints, parents, all_landmarks, estimate, n_dims)
+        return skeleton
 
     def index_of(self, landmark: str) -> int:
         """Index of the joint at a landmark.
@@ -412,63 +437,7 @@ for _name in FORMATS:
     setattr(Skeleton, _name, _constructor(_name))
 
 
-# -- columns of positions -----------------------------------------------------------------
-
-
-def parse_joint_columns(df):
-    """Names of the joints of a DataFrame of positions, and the number of axes of each.
-
-    The columns are ``<joint>_x``, ``_y``, ``_z``, joint by joint, or in the plane ``<joint>_x``,
-    ``_y``.
-    """
-    columns = getattr(df, "columns", None)
-    if columns is None or callable(columns):
-        raise ValueError(
-            "The names of joints are read from the columns of a DataFrame, got "
-            f"{type(df).__name__}. Use pd.DataFrame(positions, columns=skeleton.column_names)."
-        )
-    columns = [str(column) for column in columns]
-    for n_dims, axes in sorted(AXES.items(), reverse=True):
-        joints = [column[:-2] for column in columns[::n_dims]]
-        if joints and columns == [f"{joint}_{axis}" for joint in joints for axis in axes]:
-            return joints, n_dims
-    raise ValueError(
-        "The columns must be <joint>_x, <joint>_y, <joint>_z or, in the plane, <joint>_x, "
-        f"<joint>_y for one joint after the other, got {columns[:4]}"
-        f"{' ...' if len(columns) > 4 else ''}; select them with df[skeleton.column_names], with "
-        "df.filter(regex='_[xyz]$'), or drop the others."
-    )
-
-
-def check_columns(names, skeleton, what, width=None):
-    """Refuse columns of which one of the skeleton has the place of another one.
-
-    Columns with other names are accepted.
-
-    Parameters
-    ----------
-    names : sequence of str
-    skeleton : Skeleton
-    what : str
-        The subject of the message, with a capital letter.
-    width : int, default=None
-        The number of columns, if it is to be checked, too.
-    """
-    expected = skeleton.column_names
-    if width not in (None, len(expected)):
-        raise ValueError(
-            f"{what} has {counted(width, 'feature')} a frame, but the skeleton's "
-            f"{len(skeleton.joints)} joints need {len(expected)}: "
-            f"{', '.join(AXES[skeleton.n_dims])} of each."
-        )
-    place_of = {name: place for place, name in enumerate(expected)}
-    for place, name in enumerate(names):
-        if place_of.get(name, place) != place:
-            raise ValueError(
-                f"{what}: column {place} is {name!r}, where the skeleton has "
-                f"{(*expected, 'none')[min(place, len(expected))]!r}. Bring the columns into the "
-                "order of the skeleton's joints by df[skeleton.column_names]."
-            )
+# -- positions ----------------------------------------------------------------------------
 
 
 def loose_joints(skeleton):
@@ -478,21 +447,20 @@ def loose_joints(skeleton):
     return [j for j in range(len(skeleton.joints)) if j not in held] if skeleton.bones else []
 
 
-def _positions_of(df):
-    """The positions of a table; None if they are no numbers."""
+def _positions_of(df, columns):
+    """The positions (n_frames, n_joints, n_dims) of a table; None if they are no numbers."""
     try:
-        return as_numbers(df, "df", dtype=np.float64)
+        values = as_numbers(df.iloc[:, columns.places.ravel()], "df", dtype=np.float64)
     except (TypeError, ValueError):
         return None
+    return values.reshape(len(values), *columns.places.shape)
 
 
-def _without_still_roots(df, joints, parents, held):
+def _without_still_roots(x, joints, parents, held):
     """Parents, -1 for the joints that move away from a root that stands still and is not held."""
     roots = {p for p in parents if p >= 0 and parents[p] < 0 and joints[p] not in held}
-    positions = _positions_of(df) if roots else None
-    if positions is None or not len(positions):
+    if x is None or not roots or not len(x):
         return parents
-    x = positions.reshape(len(positions), len(joints), -1)
     largest = np.fmax.reduce(np.abs(x), axis=None, initial=0)
 
     def changes(values):
@@ -503,6 +471,28 @@ def _without_still_roots(df, joints, parents, held):
         -1 if p in still and changes(np.linalg.norm(x[:, j] - x[:, p], axis=1)) else p
         for j, p in enumerate(parents)
     ]
+
+
+def _warn_of_sides(positions, skeleton):
+    """Warn if lines from one side to the other are shorter than limbs in nearly all frames."""
+    points = landmark_positions(positions.reshape(len(positions), -1), skeleton)
+    for limb in ("arm", "thigh", "leg"):
+        if not {f"left_{limb}", f"right_{limb}"} <= set(skeleton.limbs):
+            continue
+        pairs = [LIMBS[f"{side}_{limb}"][:2] for side in SIDES]
+        start, end = (points[:, [LANDMARKS.index(pair[k]) for pair in pairs]] for k in (0, 1))
+        same, crossed = (
+            np.linalg.norm(start - ends, axis=2).sum(axis=1) for ends in (end, end[:, ::-1])
+        )
+        # A comparison with NaN is False.
+        if (crossed < same).sum() > _CROSSED * (crossed + same > 0).sum():
+            joints = {name: skeleton.landmarks[name] for pair in pairs for name in pair}
+            warnings.warn(
+                f"Left and right may be exchanged: of {joints}, each is nearer to the next joint "
+                "of the other side. Look at them, and name them right in landmarks={...}.",
+                UserWarning,
+                stacklevel=3,
+            )
 
 
 # -- checks of names, parents and landmarks -----------------------------------------------
@@ -580,11 +570,13 @@ def _check_landmarks(landmarks, named, joints):
         missing = [name for name in LANDMARKS if name not in there]
     if missing:
         got = f" (got { ({name: there[name] for name in absent}) })" if absent else ""
+        nearest = nearest_names(missing, there, joints)
+        nearest = f" The nearest names give landmarks={nearest}." if nearest else ""
         raise ValueError(
             f"No joint stands for the landmarks {missing}{got}; give landmarks={{...}} with one of "
             f"the joints {list(joints)} for each, or several of them for their mean, such as "
-            "{'pelvis': ('LASI', 'RASI')}. A landmark that the body lacks is None; both ends of "
-            "one limb must be there."
+            "{'pelvis': ('LASI', 'RASI')}. A landmark that the body lacks is None; both ends "
+            f"of one limb must be there.{nearest}"
         )
     return _ReadOnly(there)
 

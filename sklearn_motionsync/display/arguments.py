@@ -7,6 +7,8 @@ from numbers import Real
 import numpy as np
 import pandas as pd
 
+from ..body.columns import plain_positions
+from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection
 from ..inputs.facts import units_of_columns
 from ..inputs.numbers import is_integer
@@ -91,8 +93,9 @@ def as_frames(frames, n_frames):
     return np.linspace(0, n_frames - 1, int(frames)).round().astype(int).tolist()
 
 
-def as_trials(X) -> list:
-    """The trials of a collection, or a single one as a list."""
+def as_trials(X, skeleton=None) -> list:
+    """The trials of a collection, or a single one as a list; of positions with the skeleton."""
+    X = plain_positions(X, skeleton) if isinstance(skeleton, Skeleton) else X
     collection = as_collection(X)
     if collection is not None and len(collection) == 0:
         raise ValueError("Found 0 trials (n_samples=0); there is nothing to draw.")

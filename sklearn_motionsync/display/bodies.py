@@ -5,9 +5,12 @@ from copy import copy
 import numpy as np
 
 from ..body.axes import heading_axes, to_y_up
+from ..body.columns import check_columns, plain_positions
 from ..body.direction_cosines import DirectionCosines
+from ..body.formats import AXES
 from ..body.limbs import unit_vectors
-from ..body.skeleton import Skeleton, check_columns, loose_joints
+from ..body.skeleton import Skeleton, loose_joints
+from ..inputs.columns import parse_columns
 from ..inputs.numbers import as_numbers, check_finite, column_names, nanmean
 from ..matching.gaps import interpolate_gaps
 from .base import COLORS
@@ -53,15 +56,20 @@ def read_positions(x, skeleton, i):
         wanted = skeleton.column_names
         if set(column_names(x) or ()) == set(wanted) and len(x.columns) == len(wanted):
             x = x[wanted]
+        x = plain_positions(x, skeleton)
         check_columns(column_names(x) or (), skeleton, what)
         n_dims, n_joints = skeleton.n_dims, len(skeleton.joints)
         expected = f"the skeleton's {n_joints} joints are (n_frames, {n_dims * n_joints})"
-    names = column_names(x) or ()
+    names = column_names(x) if skeleton is None else None
+    axes = ""
+    if names and not (columns := parse_columns(names)).rest:
+        x, axes = x[[names[place] for place in columns.places.ravel()]], columns.axes
     x = as_numbers(x, what, dtype=np.float64)
     if skeleton is None:
+        if x.ndim == 3 and x.shape[2] in AXES:
+            x, axes = x.reshape(len(x), -1), AXES[x.shape[2]]
         width = x.shape[-1] if x.ndim > 0 else 0
-        in_plane = [str(name)[-2:] for name in names] == ["_x", "_y"] * (len(names) // 2)
-        n_dims = 2 if width % 2 == 0 and (width % 3 or (names and in_plane)) else 3
+        n_dims = len(axes) or (2 if width % 2 == 0 and width % 3 else 3)
         n_joints = width // n_dims
         expected = "joints are (n_frames, 3 * n_joints)"
     if x.ndim != 2 or x.shape[1] != n_dims * n_joints or x.size == 0:

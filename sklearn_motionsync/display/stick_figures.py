@@ -160,7 +160,7 @@ class SkeletonDisplay(MovingDisplay):
         """
         bodies = [
             place_on_floor(read_positions(x, skeleton, i), skeleton, follow=True)
-            for i, x in enumerate(as_trials(X))
+            for i, x in enumerate(as_trials(X, skeleton))
         ]
         shown = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in shown]
@@ -204,7 +204,7 @@ class SkeletonDisplay(MovingDisplay):
         SkeletonDisplay
             The display, drawn at the beginning; see `animate`.
         """
-        X = as_trials(X)
+        X = as_trials(X, skeleton)
         bodies = [place_on_floor(read_positions(x, skeleton, i), skeleton) for i, x in enumerate(X)]
         names = labels_as_text(X) if names is None else names
         labels = as_names(names, len(X), "names", "trials")
@@ -263,7 +263,7 @@ class SkeletonDisplay(MovingDisplay):
             trials = pattern_first[:_N_TRIALS]
         trials = as_indices(trials, len(match.times), "trials")
         return cls.from_trials(
-            [as_trials(X)[i] for i in trials],
+            [as_trials(X, views[0].skeleton)[i] for i in trials],
             views[0].skeleton,
             match=Match(match.times[trials]),
             names=[f"{i} (pattern)" if i == pattern else str(i) for i in trials],

@@ -7,9 +7,10 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from ..body.axes import to_y_up
+from ..body.columns import check_columns, plain_positions
 from ..body.formats import SIDES
 from ..body.landmarks import as_tuple, guess_feet
-from ..body.skeleton import Skeleton, check_columns
+from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection, check_members
 from ..inputs.numbers import nanmean
 from ..inputs.recorded import frames_of_rows, rows_at, times_of_rows
@@ -58,17 +59,20 @@ class Recordings:
     """
 
     def __init__(self, X, skeleton=None, feet=None, frame_rate=None):
+        X = X if skeleton is None else plain_positions(X, skeleton)
         sequences = as_collection(X)
         self._given = [as_pandas(X)] if sequences is None else sequences
-        self._checked = check_members(self._given, finite="allow-nan")
-        first = self._given[0]
         if skeleton is None:
+            first = next(iter(self._given), None)
             if not isinstance(first, pd.DataFrame):
                 raise ValueError(
                     "Arrays do not name their joints: give a skeleton, such as "
                     "Skeleton.from_frame(df) or Skeleton(joints, parents)."
                 )
             skeleton = Skeleton.from_frame(first)
+            self._given = plain_positions(self._given, skeleton)
+        self._checked = check_members(self._given, finite="allow-nan")
+        first = self._given[0]
         self.skeleton, self._feet = skeleton, joints_of_feet(skeleton, feet)
         names = list(first.columns) if isinstance(first, pd.DataFrame) else []
         check_columns(names, skeleton, self.called(0), self._checked[0].shape[1])

@@ -207,7 +207,8 @@ def check_members(
             raise ValueError(
                 f"{what(i)} has shape {array.shape}, expected (n_frames, n_features) with at least "
                 "2 frames and 1 feature. Give a univariate trial as a column, "
-                "x[:, np.newaxis]; if all are (n_features, n_frames), give [x.T for x in X]."
+                "x[:, np.newaxis]; if all are (n_features, n_frames), give [x.T for x in X]; "
+                "positions (n_frames, n_joints, n_dims) are given as x.reshape(len(x), -1)."
             )
         if columns != names and fitted is not None and names is fitted:
             check_names(x, names, what(i))
@@ -284,7 +285,10 @@ def as_collection(X):
         if X.ndim == 3:
             return list(X)
         if X.ndim > 3:
-            raise ValueError(f"{ACCEPTED}, got an array of shape {X.shape}.")
+            raise ValueError(
+                f"{ACCEPTED}, got an array of shape {X.shape}. Positions (n_trials, n_frames, "
+                "n_joints, n_dims) are given as [x.reshape(len(x), -1) for x in X]."
+            )
         return _members(list(X)) if X.dtype == object and X.ndim == 1 else None
     if isinstance(X, (list, tuple)):
         return _members(X)

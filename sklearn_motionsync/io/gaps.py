@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from ..body.skeleton import parse_joint_columns
+from ..body.columns import joint_columns
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import Recorded
 from ..inputs.wording import counted
@@ -25,8 +25,8 @@ def find_gaps(df: pd.DataFrame) -> pd.DataFrame:
     ----------
     df : DataFrame (n_frames, 3 * n_joints) or (n_frames, 2 * n_joints)
         Joint positions: columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, as `read_motion`
-        returns them, or ``<joint>_x``, ``<joint>_y`` of key-points in the plane. A joint is
-        missing in a frame where any of them is NaN.
+        returns them, or ``<joint>_x``, ``<joint>_y`` of key-points in the plane, or the other
+        spellings of `Skeleton.from_frame`. A joint is missing in a frame where any of them is NaN.
 
     Returns
     -------
@@ -63,11 +63,11 @@ def find_gaps(df: pd.DataFrame) -> pd.DataFrame:
       joint  first  last  n_frames  inside
     0  knee      1     2         2    True
     """
-    joints, n_dims, values = _read(df)
-    joint, first, last = _find(_missing(values, n_dims))
+    columns, values = _read(df)
+    joint, first, last = _find(_missing(values, columns))
     return pd.DataFrame(
         {
-            "joint": np.array(joints)[joint],
+            "joint": np.array(columns.joints)[joint],
             "first": first,
             "last": last,
             "n_frames": last - first + 1,
@@ -138,13 +138,15 @@ def fill_gaps(
     [1.0, 2.0, 3.0]
     """
     check_filling(max_gap, ends)
-    _, n_dims, values = _read(df)
-    missing = _missing(values, n_dims)
-    seen = np.where(np.repeat(missing, n_dims, axis=1), np.nan, values)
+    columns, values = _read(df)
+    seen = np.where(np.repeat(_missing(values, columns), len(columns.axes), axis=1), np.nan, values)
     values = np.where(np.isnan(values), interpolate_gaps(seen, max_gap, _places(df)), values)
-    result = pd.DataFrame(values, index=df.index, columns=df.columns)
+    # Columns of quality stay as they are.
+    at = {place: k for k, place in enumerate(columns.places.ravel())}
+    parts = [values[:, at[k]] if k in at else df.iloc[:, k] for k in range(df.shape[1])]
+    result = pd.DataFrame(dict(enumerate(parts)), index=df.index).set_axis(df.columns, axis=1)
     result.attrs = dict(df.attrs)
-    return _trim(result, _missing(values, n_dims)) if ends == "trim" else result
+    return _trim(result, _missing(values, columns)) if ends == "trim" else result
 
 
 def check_filling(max_gap, ends):
@@ -185,7 +187,7 @@ def warn_of_gaps(df, name):
         n_missing = n_missing[n_missing > 0]
         advice = ". Interpolate short gaps with df.interpolate(limit=<frames>, limit_area='inside')"
     else:
-        gaps, n_columns = find_gaps(df), len(parse_joint_columns(df)[0])
+        gaps, n_columns = find_gaps(df), len(joint_columns(df).joints)
         n_missing = gaps.groupby("joint")["n_frames"].sum()
         what = "positions" if kind in POSITIONS else "values"
         n_outside = int((~gaps["inside"]).sum())
@@ -209,7 +211,7 @@ def warn_of_gaps(df, name):
 
 
 def _read(df):
-    """Names of the joints, their dimensions, and a copy of the positions."""
+    """The columns of the joints, and a copy of their positions, joint by joint."""
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
             f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}; "
@@ -220,22 +222,22 @@ def _read(df):
             f"{name_recording(df)} has no positions but {df.attrs.get('kind', 'channels')}: "
             "max_gap and ends go with positions."
         )
-    joints, n_dims = parse_joint_columns(df)
+    columns = joint_columns(df)
     levels = df.index.droplevel(-1) if df.index.nlevels > 1 else df.index[:0]
     if levels.nunique() > 1:
         raise ValueError(
             f"A recording must be of one trial, got a table of {levels.nunique()}; use "
             "df.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=10)."
         )
-    values = df.to_numpy(copy=True)
-    if values.dtype != np.float64:
-        values = np.array(as_numbers(df, name_recording(df), dtype=np.float64))
-    check_finite(values, f"{name_recording(df)}, frame", list(df.columns), allow_nan=True)
-    return joints, n_dims, values
+    positions = df.iloc[:, columns.places.ravel()]
+    values = np.array(as_numbers(positions, name_recording(df), dtype=np.float64))
+    names = list(positions.columns)
+    check_finite(values, f"{name_recording(df)}, frame", names, allow_nan=True)
+    return columns, values
 
 
-def _missing(values, n_dims):
-    return np.isnan(values).reshape(len(values), -1, n_dims).any(axis=2)
+def _missing(values, columns):
+    return np.isnan(values).reshape(len(values), *columns.places.shape).any(axis=2)
 
 
 def _find(missing):

@@ -12,8 +12,10 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from ..body.axes import UP_AXES
-from ..body.skeleton import Skeleton, parse_joint_columns
+from ..body.columns import joint_columns, plain_positions
+from ..body.skeleton import Skeleton
 from ..inputs.collections import check_members
+from ..inputs.columns import parse_columns
 from ..inputs.facts import units_of_columns
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import Recorded, frame_rate_of_rows, times_of_rows
@@ -131,19 +133,22 @@ def write_motion(
 
 def _read_positions(X, skeleton, path):
     """Joints, parents, positions (n_frames, n_joints, 3), and the vertical axis."""
+    if skeleton is not None:
+        names, parents, up = list(skeleton.joints), skeleton.parents, skeleton.up
+        X = plain_positions(X, skeleton)
+    elif not isinstance(X, pd.DataFrame):
+        raise ValueError(f"{path}: an array does not name its joints: give a skeleton.")
+    else:
+        columns = joint_columns(X)
+        names = columns.joints
+        is_known = list(X.attrs.get("joints") or ()) == names
+        parents = X.attrs["parents"] if is_known else Skeleton.from_frame(X).parents
+        up = X.attrs.get("up") or "y"
+        X = X.iloc[:, columns.places.ravel()]
     # A single frame is no trial, but a pose that a file may hold: it is checked as two.
     is_pose = isinstance(X, (np.ndarray, pd.DataFrame)) and len(X) == 1
     (x,) = check_members([np.repeat(X, 2, axis=0) if is_pose else X], finite="allow-nan")
     x = x[:1] if is_pose else x
-    if skeleton is None:
-        if not isinstance(X, pd.DataFrame):
-            raise ValueError(f"{path}: an array does not name its joints: give a skeleton.")
-        names, _ = parse_joint_columns(X)
-        is_known = list(X.attrs.get("joints") or ()) == names
-        parents = X.attrs["parents"] if is_known else Skeleton.from_frame(X).parents
-        up = X.attrs.get("up") or "y"
-    else:
-        names, parents, up = list(skeleton.joints), skeleton.parents, skeleton.up
     if x.shape[1] != 3 * len(names):
         raise ValueError(
             f"{path}: X has {counted(x.shape[1], 'column')}, and "
@@ -168,7 +173,7 @@ def _rig_like(like, X, path):
     if like is None:
         attrs = getattr(X, "attrs", {})
         joints = attrs.get("joints")
-        names = [str(name)[:-2] for name in getattr(X, "columns", ())[::3]]
+        names = parse_columns(getattr(X, "columns", ())).joints
         return Rig.from_attrs(attrs) if joints == names else None
     table = like if isinstance(like, pd.DataFrame) else read_motion(like)
     rig = Rig.from_attrs(table.attrs)

@@ -119,7 +119,7 @@ def write_player(
     '<!DOCTYPE html>'
     """
     path = check_path(path, "player.html")
-    trials = as_trials(X)
+    trials = as_trials(X, skeleton)
     n = len(trials)
     if n > MOST_SHOWN:
         raise ValueError(
@@ -218,7 +218,7 @@ def player_of(trials, X, skeleton):
     skeleton : Skeleton
     """
     n, pattern = len(trials.names), trials.pattern
-    X = as_trials(X)
+    X = as_trials(X, skeleton)
     first = 0 if pattern is None else pattern
     width = int(np.prod(_points(X[first], skeleton, first)[0].shape[1:]))
     most = max(MOST_COORDINATES // (width * _FEWEST_FRAMES), 2)

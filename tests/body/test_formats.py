@@ -149,7 +149,7 @@ def test_features_do_not_depend_on_the_format(name):
         ("LShoulder RShoulder LElbow RElbow HeadTop", {"head": "HeadTop"}),
         # Plug-in Gait's markers; joint centres are better.
         ("LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE",
-         {"pelvis": ("LASI", "RASI"), "left_hip": "LASI", "right_knee": "RKNE",
+         {"pelvis": ("LASI", "RASI", "LPSI", "RPSI"), "left_hip": "LASI", "right_knee": "RKNE",
           "left_ankle": "LANK"}),
         ("LFHD RFHD LBHD RBHD C7 CLAV LSHO LELB LWRA LWRB LFIN RSHO RELB RWRA RWRB RFIN",
          {"neck": ("LSHO", "RSHO"), "head": ("LFHD", "RFHD"), "left_elbow": "LELB",

@@ -59,7 +59,7 @@ def test_two_known_frames_are_joined_by_a_line_and_none_stay_missing():
 
 
 def test_other_columns_are_refused():
-    for columns in (["a_x"], ["a_y", "a_x"], ["a_x", "b_y"], ["a_x", "a_z", "a_y"], []):
+    for columns in (["a_x"], ["a_y", "b_x"], ["a_x", "b_y"], ["a_x", "a_y", "b_z"], []):
         with pytest.raises(ValueError, match="columns must be <joint>_x, <joint>_y, <joint>_z"):
             find_gaps(pd.DataFrame(0.0, index=range(2), columns=columns))
 
