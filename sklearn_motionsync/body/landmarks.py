@@ -259,13 +259,16 @@ def _entries(text):
     for entry in text.split():
         words = [member.split("|") for member in entry.strip("~*").split("+")]
         if entry.startswith("~"):
-            outer, inner = (
-                [name for stem in words[0] for word in of_it for name in (word + stem, stem + word)]
-                for of_it in (_OUTER, _INNER)
-            )
+            stems = words[0]
             # Stems of a letter or two are too short to name a joint without another word.
-            plain = [stem for stem in words[0] if len(stem) > 2]
-            entries += [(False, [outer + plain, inner]), (False, [plain + outer])]
+            plain = [stem for stem in stems if len(stem) > 2]
+            for some in (*([stem] for stem in stems), stems):
+                outer, inner = (
+                    [name for stem in some for w in of_it for name in (w + stem, stem + w)]
+                    for of_it in (_OUTER, _INNER)
+                )
+                entries.append((False, [outer + [stem for stem in some if stem in plain], inner]))
+            entries.append((False, [plain + outer]))
         else:
             entries.append((entry.endswith("*"), words))
     return entries
