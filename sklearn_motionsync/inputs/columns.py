@@ -6,15 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["JointColumns", "find_clock", "parse_columns"]
+__all__ = ["CONFIDENCE", "JointColumns", "find_clock", "parse_columns"]
 
 # Names of columns that tell how sure a position is, the best ones first.
-_CONFIDENCE = [
+CONFIDENCE = [
     *("likelihood", "confidence", "conf", "score", "visibility", "visible", "vis", "probability"),
     *("prob", "certainty", "quality", "tracking[ _]?state", "state", "presence", "[vcps]"),
 ]
 # The axes, w of a quaternion, the confidence, and errors, of which larger ones are worse.
-_TAIL = rf"(?P<tail>[xyzw]|{'|'.join(_CONFIDENCE)}|error|residual|inferred|n_?cams)"
+_TAIL = rf"(?P<tail>[xyzw]|{'|'.join(CONFIDENCE)}|error|residual|inferred|n_?cams)"
 _BETWEEN = r"[\s_.:;/|-]"
 _UNIT = r"(?:[\s_]*[\s_\[(](?P<unit>mm|cm|m|px|pixels?)[\])]?)?"
 # LASI_x, LASI X, LASI:X, LASI[x], LASI.x (mm); x_LASI, X LASI; LASIX, noseX; x0.
@@ -180,6 +180,6 @@ def _best(spellings):
 def _rank(quality):
     """How well a quality tells the confidence, the best first, and its column; errors do not."""
     name, place = quality
-    ranks = (i for i, each in enumerate(_CONFIDENCE) if re.fullmatch(each, name))
-    rank = next(ranks, len(_CONFIDENCE))
-    return rank, place if rank < len(_CONFIDENCE) else -1
+    ranks = (i for i, each in enumerate(CONFIDENCE) if re.fullmatch(each, name))
+    rank = next(ranks, len(CONFIDENCE))
+    return rank, place if rank < len(CONFIDENCE) else -1

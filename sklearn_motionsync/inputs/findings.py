@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from .collections import NOT_ONE, as_collection, check_members
+from .columns import CONFIDENCE
 from .numbers import listed
 from .types import TrialsLike
 from .wording import counted, within
@@ -34,8 +35,8 @@ _FACTORS |= {100.0: "metres and centimetres", 25.4: "inches and millimetres"}
 _OF_PEOPLE, _OF_FEATURES = 1.5, 2.5
 # Numbers of frames of which one trial has so many times as many as the others are another rate.
 _RATES = 2.0, 2.4, 2.5, 4.0, 5.0, 8.0, 10.0
-# Names of columns that tell how sure positions are.
-_QUALITY = ("likelihood", "confidence", "visibility", "presence", "score", "quality", "certainty")
+# Names of columns that tell how sure positions are, without those of a letter.
+_QUALITY = tuple(word for word in CONFIDENCE if word.isalpha() and len(word) > 3)
 # Frames from which on a feature on a straight line counts as a clock.
 _CLOCK_FRAMES = 8
 # The share of the spread of joints that is along the vertical axis of a body that stands.
@@ -388,7 +389,7 @@ def _quality(numbers, names):
     inside = (numbers.low >= 0) & (numbers.high <= 1)
     if names is not None:
         words = [str(name[-1] if isinstance(name, tuple) else name).lower() for name in names]
-        named = [any(word.endswith(quality) for quality in _QUALITY) for word in words]
+        named = [word.endswith(_QUALITY) for word in words]
         columns = np.flatnonzero(named & inside)
     else:
         is_third = np.arange(width) % 3 == 2
