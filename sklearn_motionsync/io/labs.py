@@ -127,10 +127,7 @@ def _read_sections(text):
         lines.append((text.line_number, text.is_whole, line))
     separator = next((found[1] for *_, x in lines if (found := _AXES_ROW.match(x))), None)
     if separator is None:
-        raise ValueError(
-            f"{text.path}: there is no row 'Frame,Sub Frame,X,Y,Z', as Vicon Nexus writes it, and "
-            "no other known format is like this file."
-        )
+        raise ValueError(f"{text.path} is of no known format; Vicon's has 'Frame,Sub Frame,X,Y,Z'.")
     for number, is_whole, line in lines:
         # With semicolons numbers have decimal commas.
         line = line.replace(b",", b".") if separator == b";" else line
@@ -203,10 +200,7 @@ def _read_times(text, numbers, rate):
     per_frame = np.floor(sub.max()) + 1
     times = ((numbers[:, 0] - 1) * per_frame + sub) / (rate or 1)
     if not (sub.min() >= 0 and per_frame <= _MOST_SUB_FRAMES and (np.diff(times) >= 0).all()):
-        raise text.error(
-            f"Sub Frames must rise from 0 to at most {_MOST_SUB_FRAMES}, got {sub.min():g} to "
-            f"{sub.max():g}, or another order."
-        )
+        raise text.error(f"Sub Frames are 0 to {_MOST_SUB_FRAMES}, in order; got {sub.max():g}.")
     return times
 
 
@@ -238,9 +232,8 @@ def read_qtm(path):
             "expected DATA_INCLUDED 3D with MARKER_NAMES, or 6D with BODY_NAMES, got "
             f"{quote([contents])} and {quote(list(header))}."
         )
-    leads, n = (2, 0), len(names)
+    leads, n = (2, 0), len(names)  # Frame and Time may be there, and the names of the columns
     if fields and not any(re.fullmatch(rb"[-+.\deE]+", field) for field in fields):
-        # The names of the columns.
         leads = (sum(field.lower() in (b"frame", b"time") for field in fields[:2]),)
         row = text.row(b"\n")
     sizes = [(lead, lead + n * width) for lead in leads for width in widths]
@@ -263,12 +256,11 @@ def read_qtm(path):
     hide_unseen(facts["positions"])
     if lead:
         facts |= {"times": values[:, 1].copy(), "decimals": decimals}
-    start = values[0, 1] * (rate or 1) if lead else 0.0
     return facts | {
         "frame_rate": rate, "units": "mm", "up": None,
         "kind": "markers" if noun == "marker" else "joints",
         "first_frame": int(values[0, 0]) if lead and math.isfinite(values[0, 0]) else 1,
-        "events": describe_events(entries, rate, start),
+        "events": describe_events(entries, rate, values[0, 1] * (rate or 1) if lead else 0.0),
         "left_out": "" if noun == "marker" else counted(n, "rotation"),
     }  # fmt: skip
 
@@ -292,10 +284,10 @@ def read_motive(path, *, group=None):
     axes = _cells(row.lower())
     if b"name" not in table or not b"".join(axes[1:2]).startswith(b"time"):
         raise text.error("expected rows of Type, Name, ID and 'Frame,Time (Seconds),X,Y,Z'.")
-    keys = (b"type", b"name", b"id", b"parent", b"")
-    rows = [list(map(decode, table.get(key, []) + [b""] * len(axes))) for key in keys]
+    rows = (table.get(x, []) + [b""] * len(axes) for x in (b"type", b"name", b"id", b"parent", b""))
     members, others = {"joints": [], "markers": []}, Counter()
-    for j, (kind, name, mark, parent, what) in enumerate(zip(*rows, strict=False)):
+    for j, cells in enumerate(zip(*rows, strict=False)):
+        kind, name, mark, parent, what = map(decode, cells)
         others["rotation"] += (what.lower(), axes[j : j + 1]) == ("rotation", [b"x"])
         if what.lower() == "position" and axes[j : j + 3] == [b"x", b"y", b"z"]:
             kind = f"unlabelled {kind}" if name.lower().startswith("unlabel") else kind

@@ -414,7 +414,7 @@ def describe_events(entries, rate, start):
             "label": label,
             "context": context or None,
             "time": time,
-            "frame": None if rate is None else round(time * rate - start, 5),
+            "frame": None if rate is None else round(float(time * rate - start), 5),
         }
         # The numbers of a C3D file have 24 bits.
         for label, context, time in ((*texts, round(time, 6)) for *texts, time in entries)
