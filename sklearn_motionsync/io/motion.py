@@ -275,7 +275,8 @@ def _format_of(path):
         head = file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
     ending = path.suffix.lower()
     fitting = [each for each in FORMATS if each.fits(path, head)]
-    fitting = fitting or [each for each in FORMATS if ending in each.endings]
+    # Of several formats of text the last, a table, takes what none knows by its content.
+    fitting = fitting or [each for each in FORMATS if ending in each.endings][-1:]
     if not fitting:
         raise ValueError(
             f"{path} ends with {path.suffix!r}, which no reader is for, and does not begin like a "

@@ -443,7 +443,7 @@ def tracked(*shape):
 def landmarks(n_frames=6):
     columns = [f"{a}{k}" for k in range(33) for a in "xyzv"]
     rows = tracked(n_frames, 33, 4).reshape(n_frames, -1)
-    times = [[k, 40 * k] for k in range(n_frames)]
+    times = [[k, 20 * k] for k in range(n_frames)]
     return table(["frame", "timestamp_ms", *columns], np.hstack([times, rows]).tolist())
 
 

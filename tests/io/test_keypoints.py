@@ -239,7 +239,7 @@ def test_mediapipe_in_several_spellings(tmp_path, spelling):
     assert (df.attrs["format"], df.attrs["up"]) == ("mediapipe", "-y")
     numbered = read_motion(put(tmp_path, landmarks(), "b.csv"))
     check(numbered, tracked(6, 33, 4)[..., :3], list(names))
-    assert numbered.attrs["frame_rate"] == 25.0
+    assert numbered.attrs["frame_rate"] == 50.0
 
 
 @pytest.mark.parametrize("n", [3, 33, 34, 553])
