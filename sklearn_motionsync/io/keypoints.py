@@ -20,6 +20,8 @@ from .text import Cells, check_result_size, decode, make_unique, naming, read_ce
 _HEAD = 2**16
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _MEDIAPIPE = list(BODIES["mediapipe"].parents)
+# Landmarks that are numbered: the number alone, or behind the word.
+_NUMBERED = r"(?:lm|(?:pose)?[\s_]*landmarks?|keypoints?)?[\s_]*(\d+)"
 # The joints of OpenPose by their number: BODY_25, and COCO without the feet and the mid hip.
 _BODY_25 = list(BODIES["openpose"].parents)
 _OPENPOSE = {25: _BODY_25, 18: _BODY_25[:8] + _BODY_25[9:19]}
@@ -148,13 +150,12 @@ def read_array(path):
 def name_landmarks(joints):
     """The joints as `Skeleton.mediapipe` names them; None if they are not its landmarks.
 
-    They are known by names in any spelling, or as 33 numbered joints in order.
+    They are known by names in any spelling, or as 33 numbered landmarks in order.
     """
-    numbered = [re.fullmatch(r"(.*?)(\d+)", joint) for joint in joints]
+    numbered = [re.fullmatch(_NUMBERED, joint, re.IGNORECASE) for joint in joints]
     if len(joints) == len(_MEDIAPIPE) and all(numbered):
-        steps = np.diff([float(each[2]) for each in numbered])
-        is_in_order = (steps == 1).all() and len({each[1] for each in numbered}) == 1
-        return list(_MEDIAPIPE) if is_in_order else None
+        steps = np.diff([float(each[1]) for each in numbered])
+        return list(_MEDIAPIPE) if (steps == 1).all() else None
     name_of = {name.replace("_", ""): name for name in _MEDIAPIPE}
     names = [name_of.get(re.sub(r"[^a-z0-9]", "", x.lower()), x) for x in joints]
     return names if set(_MEDIAPIPE) <= set(names) else None
@@ -202,12 +203,12 @@ def _assemble(cells, frame=None, **facts):
         raise ValueError(
             f"{cells.path} is no recording, most of its columns are text: {listed(texts)}."
         )
-    left = [str(labels[x]) for x in range(len(labels)) if x not in {*taken, frame, time, subject}]
+    seen, qualities = {*taken, frame, time, subject}, set(columns.confidence)
+    left = [str(label) for x, label in enumerate(labels) if x not in seen]
     facts |= {"left_out": f"the columns {listed(left)}"} if left else {}
     blank = np.full(len(cells.table), np.nan)
     values = [
-        blank if x < 0 else cells.numbers(x, _STATES if x in columns.confidence else None)
-        for x in taken
+        blank if x < 0 else cells.numbers(x, _STATES if x in qualities else None) for x in taken
     ]
     values = np.stack(values, axis=1)
     times = None if time is None else cells.numbers(time)

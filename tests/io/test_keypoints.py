@@ -1,6 +1,7 @@
 """Key-points of trackers and tables of joints: numbers that the tests wrote, names, clocks."""
 
 import json
+import re
 import sys
 import types
 
@@ -240,6 +241,9 @@ def test_mediapipe_in_several_spellings(tmp_path, spelling):
     numbered = read_motion(put(tmp_path, landmarks(), "b.csv"))
     check(numbered, tracked(6, 33, 4)[..., :3], list(names))
     assert numbered.attrs["frame_rate"] == 50.0
+    # 33 markers with numbers are no landmarks.
+    markers = read_motion(put(tmp_path, re.sub(r"([xyzv])(\d+)", r"M\2_\1", landmarks()), "c.csv"))
+    check(markers, tracked(6, 33, 4)[..., :3], [f"M{k}" for k in range(33)])
 
 
 @pytest.mark.parametrize("n", [3, 33, 34, 553])
