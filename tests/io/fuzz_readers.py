@@ -34,7 +34,7 @@ WORDS = (
     *(b"endheader nRows=7 nColumns=9 inDegrees=yes DataType=Vec3 1,2,3 , \t \t\t\t".split(b" ")),
 )
 # Formats that may hold missing values.
-WITH_GAPS = ("c3d", "trc", "mot", "sto", "vicon", "qtm", "motive", "sleap", "deeplabcut")
+WITH_GAPS = ("c3d", "trc", "mot", "sto", "mvnx", "vicon", "qtm", "motive", "sleap", "deeplabcut")
 WITH_GAPS += ("openpose", "mediapipe", "table", "array")
 
 
@@ -123,7 +123,9 @@ TEXT = (flip_bits, flip_bits, overwrite, truncate, repeat, repeat, move)
 TEXT += (set_number, set_number, set_word, set_word)
 # How files are damaged, by the ending of their names.
 DAMAGES = {".c3d": BINARY, ".npz": BINARY[:8] + ARCHIVE}
-DAMAGES |= dict.fromkeys((".bvh", ".amc", ".asf", ".trc", ".mot", ".sto", ".csv", ".tsv"), TEXT)
+DAMAGES |= dict.fromkeys(
+    (".bvh", ".amc", ".asf", ".trc", ".mot", ".sto", ".mvnx", ".csv", ".tsv"), TEXT
+)
 DAMAGES |= {".json": TEXT, ".npy": BINARY}
 
 

@@ -1,6 +1,7 @@
 """Small files of motion capture."""
 
 import io
+import itertools
 import json
 import struct
 
@@ -447,6 +448,36 @@ def landmarks(n_frames=6):
     return table(["frame", "timestamp_ms", *columns], np.hstack([times, rows]).tolist())
 
 
+def mvnx(positions, angles=None, rate=60, times=None, label="Suit 1", head="", more=""):
+    """An MVNX file of segments in a row; positions and angles (n_frames, n, 3) of frames."""
+    n = positions.shape[1]
+    names = ["Pelvis", "L5", "L3", "T12"][:n]
+    times = [round(1000 * k / rate) for k in range(len(positions))] if times is None else times
+    zeros = " ".join("0" * 3 * n)
+
+    def frame(kind, of, numbers):
+        inside = "".join(f"<{k}>{' '.join(map(str, v))}</{k}>\n" for k, v in numbers.items())
+        time = "" if of is None else f' time="{of}"'
+        return f'<frame{time} index="0" type="{kind}">\n{inside}</frame>\n'
+
+    joints = "".join(
+        f'<joint label="j{b}"><connector1>{a}/j{b}</connector1>\n'
+        f"<connector2>{b}/j{b}</connector2></joint>\n"
+        for a, b in itertools.pairwise(names)
+    )
+    text = f'''<?xml version="1.0" encoding="UTF-8"?>\n{head}
+<mvnx xmlns="http://www.xsens.com/mvn/mvnx" version="4">
+<subject label="{label}" frameRate="{rate}" segmentCount="{n}">
+<segments>'''
+    text += "".join(f'<segment label="{name}"><points/></segment>\n' for name in names)
+    text += f"</segments>\n<joints>\n{joints}</joints>\n<frames>\n"
+    text += "".join(frame(kind, 0, {"position": [zeros]}) for kind in ("identity", "tpose"))
+    for i, (time, x) in enumerate(zip(times, positions, strict=True)):
+        of_joints = {} if angles is None else {"jointAngle": angles[i].ravel()}
+        text += frame("normal", time, {"orientation": [1], "position": x.ravel()} | of_joints)
+    return text + f"</frames>\n{more}</subject>\n</mvnx>\n"
+
+
 VECTORS, VEC3 = [["1,2,3", "~[4,5,6]"]] * 20, "DataType=Vec3\nDataRate=100\n"
 # For each format a function that returns the files of a small example, {name: bytes}, the first of
 # which is read, or its folder for a file of JSON.
@@ -457,6 +488,7 @@ EXAMPLES = {
     "trc": lambda: {"a.trc": trc(tracks(gap=(3, 9)), ["LASI", "R Knee", "V_Sacral"]).encode()},
     "mot": lambda: {"a.mot": storage([[1.5, -2], [2, 0]] * 9, ["knee", "force_vx"]).encode()},
     "sto": lambda: {"a.sto": storage(VECTORS, ["pelvis", "torso"], header=VEC3).encode()},
+    "mvnx": lambda: {"a.mvnx": mvnx(tracks(), tracks()[:, :2]).encode()},
     "vicon": lambda: {"a.csv": nexus()[0].encode()},
     "qtm": lambda: {
         "a.tsv": qtm(
