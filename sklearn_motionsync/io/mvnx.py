@@ -1,6 +1,5 @@
 """MVNX: segments and joint angles of Xsens, in XML."""
 
-import mmap
 import re
 from xml.etree import ElementTree
 
@@ -85,9 +84,12 @@ class _File:
         """Starts and ends of all elements."""
         with self.path.open("rb") as file:
             try:
-                with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-                    if _ENTITY.search(content):
+                end = b""
+                while portion := file.read(2**16):
+                    if _ENTITY.search(end + portion):
                         raise ValueError("it declares entities, which no recording needs")
+                    end = portion[-16:]
+                file.seek(0)
                 yield from ElementTree.iterparse(file, ("start", "end"))
             except (ElementTree.ParseError, LookupError, ValueError) as error:
                 raise self.error(f"{error}; the file is damaged or not complete.") from error
