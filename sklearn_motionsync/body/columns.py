@@ -63,7 +63,7 @@ def plain_positions(X, skeleton):
     Tables of other spellings, and arrays (n_frames, n_joints, n_dims) or a stack of them, become
     such ones where they fit to the skeleton; all else stays as it is.
     """
-    if isinstance(X, (list, tuple)):
+    if type(X) in (list, tuple):  # but not what was checked before
         return [plain_positions(x, skeleton) if hasattr(x, "shape") else x for x in X]
     fitting = columns_of_skeleton(X, skeleton)
     if fitting is not None:

@@ -143,16 +143,13 @@ def missing_counterparts(landmarks, named):
 def nearest_names(missing, landmarks, joints):
     """For missing landmarks the free joints whose names are nearest to what they could be."""
     held = {joint for at in landmarks.values() for joint in as_tuple(at)}
-    free = {_plain(name): joint for name, joint in _without_prefix(list(joints))}
-    free = {name: joint for name, joint in free.items() if joint not in held}
-    nearest = {}
+    pairs = [pair for pair in _without_prefix(list(joints)) if pair[1] not in held]
+    free, nearest = {_plain(name): joint for name, joint in pairs}, {}
     for landmark in missing:
         side, _, part = landmark.rpartition("_")
-        words = [_plain(name) for name in as_tuple(landmarks.get(landmark, ()))]
-        words += [
-            (side if len(word) > 4 else side[:1]) + word
-            for word in re.findall("[a-z]+", _JOINTS[part])
-        ]
+        words = list(map(_plain, as_tuple(landmarks.get(landmark, ()))))
+        for word in re.findall("[a-z]+", _JOINTS[part]):
+            words.append((side if len(word) > 4 else side[:1]) + word)
         matches = (difflib.get_close_matches(word, free, 1, 0.75) for word in words)
         if match := next(filter(None, matches), None):
             nearest[landmark] = free[match[0]]
@@ -307,7 +304,9 @@ def _readings(words, plain):
     # In "LWR" beside "RWR" the last letter is none, nor in "EPIl" beside "EPIm", which is lateral,
     # and "STYr" beside "STYu", which is radial.
     opposite = {"l": "r", "r": "l"}
-    is_first = at is None and opposite.get(whole[:1], "") + whole[1:] in plain - {whole}
+    turned = opposite.get(whole[:1], "-") + whole[1:]
     is_other = rest + {"l": "m", "r": "u"}.get(word, "-") in plain
-    is_none = is_first or (is_other and rest + opposite[word] not in plain)
-    yield ("", whole) if is_none else (_SIDE_OF.get(word, ""), rest)
+    if (at is None and turned in plain) or (is_other and rest + opposite[word] not in plain):
+        yield "", whole
+    else:
+        yield _SIDE_OF.get(word, ""), rest

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, JointPositions, Skeleton
 from sklearn_motionsync.body import mirror
+from sklearn_motionsync.body.columns import plain_positions
 from sklearn_motionsync.datasets import make_bending, make_walk
 from sklearn_motionsync.display import SkeletonDisplay
 from sklearn_motionsync.gait import gait_events
@@ -107,6 +108,11 @@ def test_confidence_goes_to_the_other_side_with_its_joint():
         other = joint.replace("left", "LEFT").replace("right", "left").replace("LEFT", "right")
         expected = (JOINTS.index(other) + 1) / 20
         assert (image["net", joint, "likelihood"] == expected).all()
+
+
+def test_trials_that_were_checked_stay_as_they_are():
+    checked = DenseSynchronizer(20).fit(X).check_trials(X)
+    assert plain_positions(checked, SKELETON) is checked
 
 
 def test_stacks_of_arrays_of_joints():
