@@ -28,7 +28,7 @@ __all__ = [
 #         "KneeLat" and "KneeMed" or "LFC" and "MFC"; otherwise the outer one, or the plain name;
 #   a*    a bone, which is at its near end in skeletons; markers of that name are on its middle.
 _JOINTS = {
-    "pelvis": "pelvis|hips|hip|hipcenter|midhip|spinebase|root|pelo",
+    "pelvis": "pelvis|hips|hip|hipcenter|midhip|spinebase|root|pelo|waist",
     "neck": "neck|neck1|neck01|necktwist01|shouldercenter|spineshoulder|thorax|trxo",
     "head": "head|nose|headtop|headtopend|hedo|tophead|vertex",
     "shoulder": """sjc|shoulderjc|clo upperarm|uparm|uarm|arm* shoulder|shouldertop|sho|should
@@ -44,7 +44,7 @@ _JOINTS = {
     "ankle": "ajc|anklejc|tio fal+tam ank+med ~ankle|ank|mal|mall|malleolus|m|fal foot*",
     "heel": "heel|hee|heelback|calcaneus|calcn|calca|calc|cal|ca|fcc",
     "toe": """bigtoe|toetip|toe|toes|footindex|toebase|ball|mt2|forefoot2|fm2|mt1|mt5|hal|hlx|smh
-        toelat+toemed foot""",
+        ~toe foot""",
 }  # fmt: skip
 _OUTER = ["lateral", "lat", "l", "outer", "out", "ext", "radial", "rad", "radius"]
 _INNER = ["medial", "med", "m", "inner", "int", "in", "mid", "ulnar", "uln", "ulna"]

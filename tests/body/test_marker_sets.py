@@ -50,6 +50,12 @@ SETS = {
         "knee": "L.Knee.Lat L.Knee.Med", "ankle": "L.Ankle.Lat L.Ankle.Med", "toe": "L.Toe.Tip"}),
     "Pose2Sim": ("LASI LPSI LKneeLat LKneeMed LAnkleLat LAnkleMed LxHeel LBigToe", {
         "knee": "LKneeLat LKneeMed", "ankle": "LAnkleLat LAnkleMed", "heel": "LxHeel"}),
+    "OptiTrack": ("HeadTop WaistLFront WaistLBack LShoulderTop LElbowOut LWristOut LWristIn LThigh "
+                  "LKneeOut LShin LAnkleOut LToeOut LToeIn LHeel", {
+        "head": "HeadTop", "hip": "WaistLFront", "knee": "LKneeOut", "ankle": "LAnkleOut",
+        "wrist": "LWristOut LWristIn", "toe": "LToeOut LToeIn", "heel": "LHeel"}),
+    "ISB": ("L.ASIS L.PSIS L.LE L.ME L.LM L.MM L.AC L.EL L.EM L.RS L.US", {
+        "knee": "L.LE L.ME", "ankle": "L.LM L.MM", "elbow": "L.EL L.EM", "wrist": "L.RS L.US"}),
     "CMU": ("LFWT LBWT LKNE LANK LHEE LTOE LSHO LELB LWRA LWRB LFHD", {
         "hip": "LFWT", "pelvis": "LFWT RFWT LBWT RBWT", "head": "LFHD RFHD"}),
     "side at the end": ("ASISl PSISl KneeLatL KneeMedL AnkleL AcromionL LateralEpicondyleL", {
@@ -63,7 +69,7 @@ SETS = {
 
 def other(name):
     """A name with its sides exchanged."""
-    if name in ("V.Sacral", "Top.Head", "HeadFront"):
+    if name in ("V.Sacral", "Top.Head", "HeadFront", "HeadTop"):
         return name
     k = 0 if name[0] == "L" and name[:3] != "Lat" else len(name) - 1
     k = 5 if name.startswith("Waist") else k
