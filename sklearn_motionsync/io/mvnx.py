@@ -38,12 +38,11 @@ def read_mvnx(path, *, group="segments"):
     values = values[:, 1:].copy()
     if group == "angles":
         channels = [f"{joint}_{axis}" for joint in file.joints for axis in "xyz"]
-        facts |= {"channels": channels, "values": values}
-    else:
-        positions = values.reshape(len(rows), -1, 3)
-        parents = file.parents or [-1] * len(file.segments)
-        facts |= {"joints": file.segments, "parents": parents, "positions": positions}
-    return facts | {"subjects": [file.subject] * len(facts.get("joints") or channels)}
+        subjects = [file.subject] * len(channels)
+        return facts | {"channels": channels, "values": values, "subjects": subjects}
+    facts |= {"joints": file.segments, "subjects": [file.subject] * len(file.segments)}
+    positions = values.reshape(len(rows), -1, 3)
+    return facts | {"parents": file.parents, "positions": positions}
 
 
 class _File:
@@ -69,7 +68,7 @@ class _File:
             elif event == "start" and name == "frames":
                 frames = element
             elif event == "end" and name == "segments":
-                self.segments = _labels_of(element)
+                self.segments, self.parents = _labels_of(element), [-1] * len(element)
             elif event == "end" and name == "joints":
                 self.joints, self.parents = _labels_of(element), _parents_of(self.segments, element)
             elif event == "end" and name == "frame" and frames is not None:
@@ -113,8 +112,8 @@ def _name_of(element):
 
 
 def _labels_of(element):
-    names = [child.get("label") or f"{_name_of(child)}_{i + 1}" for i, child in enumerate(element)]
-    return make_unique(names)
+    named = enumerate(element, 1)
+    return make_unique([x.get("label") or f"{_name_of(x)}_{i}" for i, x in named])
 
 
 def _parents_of(segments, joints):
