@@ -241,7 +241,7 @@ def read_qtm(path):
     if not fitting or 1 in leads:
         raise text.error(
             f"{decode(key)} names {n}, each with {' or '.join(map(str, widths))} columns, behind "
-            f"Frame and Time or without both; got {len(split_fields(row))} columns."
+            f"Frame and Time or without both; got {counted(len(split_fields(row)), 'column')}."
         )
     lead, size = fitting[0]
     rows = itertools.chain([row] * bool(row), iter(lambda: text.row(None if lead else b"\n"), b""))

@@ -349,7 +349,7 @@ def test_call_refuses(call, words):
 
 def test_fit_warns_of_a_clock_among_the_features():
     clocks = [np.column_stack([0.02 * np.arange(len(x)), x]) for x in X]
-    with pytest.warns(UserWarning, match="Feature 0 increases evenly in every trial"):
+    with pytest.warns(UserWarning, match="Feature 0: increases evenly in every trial"):
         LinearSynchronizer().fit(clocks)
     named = [pd.DataFrame(x, columns=["time", *NAMES]).round(3) for x in clocks]
     with pytest.warns(UserWarning, match="Feature 'time' .* clock"):
