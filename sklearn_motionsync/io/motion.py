@@ -200,67 +200,72 @@ def read_motion(
     """
     check_filling(max_gap, ends)
     check_frame_rate(frame_rate)
-    if columns not in (None, "common") or (columns and isinstance(path, (str, os.PathLike))):
-        raise ValueError(
-            "columns must be None, or 'common' with a list of several files, got "
-            f"columns={columns!r} for {path!r}."
-        )
-    if quality not in ("drop", "keep"):
-        raise ValueError(f"quality must be 'drop' or 'keep', got {quality!r}.")
-    check_confidence(min_confidence)
+    check_confidence(min_confidence, quality)
     options: dict[str, Any] = {"asf": asf, "group": group}
-    generic = {
-        "frame_rate": frame_rate, "max_gap": max_gap, "ends": ends, "subject": subject,
-        "min_confidence": min_confidence, "quality": quality, "verbose": verbose,
-    }  # fmt: skip
-    if not isinstance(path, (str, os.PathLike)):
-        return _read_several(path, columns, options | generic)
-    path = FilePath(path)
-    known = _format_of(path)
+    files, known = _files_of(path, columns)
     if known is None:
-        files = sorted(x for x in path.iterdir() if x.suffix.lower() in ENDINGS)
-        if not files:
-            raise FileNotFoundError(f"There is no motion file at {path}, a folder without any.")
-        return _read_several(files, columns, options | generic)
-    motion = _read_file(path, known, options)
-    _hide_damage(motion, path)
-    choose_subject(motion, subject, path)
+        options |= {
+            "frame_rate": frame_rate, "max_gap": max_gap, "ends": ends, "subject": subject,
+            "min_confidence": min_confidence, "quality": quality, "verbose": verbose,
+        }  # fmt: skip
+        return _read_several(files, columns, options)
+    (file,) = files
+    motion = _read_file(file, known, options)
+    _hide_damage(motion, file)
+    choose_subject(motion, subject, file)
     confidence = motion.pop("confidence", None)
     if min_confidence is not None and confidence is not None:
         motion["positions"][confidence < min_confidence] = np.nan
-    if "times" in motion:
+    times = motion.pop("times", None)
+    if times is not None:
+        stated, decimals = motion["frame_rate"], motion.pop("decimals")
         motion |= describe_times(
-            path.name,
-            motion.pop("times"),
-            stated=motion["frame_rate"],
-            decimals=motion.pop("decimals"),
-            frame_rate=frame_rate,
+            file.name, times, stated=stated, decimals=decimals, frame_rate=frame_rate
         )
-    elif frame_rate is not None:
-        motion["frame_rate"] = float(frame_rate)
-    _set_clock(motion, is_new=frame_rate is not None)
-    df = _to_frame(motion, path, known)
+    _set_clock(motion, frame_rate)
+    df = _to_frame(motion, file, known)
     if max_gap or ends != "keep":
         df = fill_gaps(df, max_gap, ends=ends)
     df.attrs["report"] = _report(df)
     if verbose:
-        print(f"{path.name}: {df.attrs['report']}")
-    warn_of_gaps(df, path.name)
+        print(f"{file.name}: {df.attrs['report']}")
+    warn_of_gaps(df, file.name)
     is_wanted = quality == "keep" and confidence is not None
     return _with_confidence(df, confidence) if is_wanted else df
 
 
-def _set_clock(motion, is_new):
+def _files_of(path, columns):
+    """The files that are asked for, and the format of the only one; None of several."""
+    several = not isinstance(path, (str, os.PathLike))
+    files = path if several else [FilePath(path)]
+    known = None if several else _format_of(files[0])
+    if columns not in (None, "common") or (columns and known):
+        raise ValueError(
+            "columns must be None, or 'common' with a folder or a list of several files, got "
+            f"columns={columns!r} for {path!r}."
+        )
+    if not several and known is None:
+        files = sorted(x for x in files[0].iterdir() if x.suffix.lower() in ENDINGS)
+        if not files:
+            raise FileNotFoundError(f"There is no motion file at {path}, a folder without any.")
+    return files, known
+
+
+def _set_clock(motion, frame_rate):
     """The time of the first frame; at a new frame rate events are at other times too."""
+    if frame_rate is not None:
+        motion["frame_rate"] = float(frame_rate)
     if (rate := motion["frame_rate"]) is None:
         return
     motion["first_time"] = first_time_of(motion) or 0.0
     for event in motion.get("events", ()):
-        if is_new and event["frame"] is not None:
+        if frame_rate is not None and event["frame"] is not None:
             event["time"] = round(motion["first_time"] + event["frame"] / rate, 6)
 
 
-def check_confidence(min_confidence):
+def check_confidence(min_confidence, quality="drop"):
+    if quality not in ("drop", "keep"):
+        raise ValueError(f"quality must be 'drop' or 'keep', got {quality!r}.")
     if not isinstance(min_confidence, Real | None) or isinstance(min_confidence, bool):
         raise ValueError(f"min_confidence must be a number such as 0.6, got {min_confidence!r}.")
 

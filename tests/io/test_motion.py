@@ -222,7 +222,9 @@ def test_several_files_are_read_as_a_list(tmp_path):
         (only,) = read_motion([paths[0], angles], group="angles")
     pd.testing.assert_frame_equal(only, read_motion(angles, group="angles"))
     for given, columns in ((paths, "all"), (paths[0], "common")):
-        with pytest.raises(ValueError, match="columns must be None, or 'common' with a list"):
+        with pytest.raises(
+            ValueError, match="columns must be None, or 'common' with a folder or a list"
+        ):
             read_motion(given, columns=columns)
 
 
