@@ -23,7 +23,8 @@ def joint_columns(df):
             "The names of joints are read from the columns of a DataFrame, got "
             f"{type(df).__name__}. Use pd.DataFrame(positions, columns=skeleton.column_names)."
         )
-    parsed, others = _parse(tuple(columns))
+    # What a file calls joints may be their angles.
+    parsed, others = _parse(tuple(columns), "joints" in getattr(df, "attrs", {}))
     if not parsed.joints or others:
         names = [str(column) for column in columns]
         raise ValueError(
@@ -108,9 +109,9 @@ def check_columns(names, skeleton, what, width=None):
 
 
 @functools.lru_cache(maxsize=32)
-def _parse(columns):
+def _parse(columns, any_vector=False):
     """The parsed columns, and the names of those that are no position, quality or clock."""
-    parsed, clock = parse_columns(columns), find_clock(columns)[:2]
+    parsed, clock = parse_columns(columns, any_vector), find_clock(columns)[:2]
     return parsed, [columns[place] for place in parsed.rest if place not in clock]
 
 

@@ -75,19 +75,20 @@ class JointColumns(NamedTuple):
     units: str | None
 
 
-def parse_columns(labels):
+def parse_columns(labels, any_vector=False):
     """The joints, axes and qualities of columns, as `JointColumns`.
 
     Labels are texts such as "LASI_x", "LASI X", "LASI:X" or "x_LASI", all in one of these
     spellings; or tuples of a `MultiIndex`, such as (network, joint, axis) or (network, subject,
     joint, axis). Joints that lack an axis that others have are left to the rest, as are vectors
-    whose names say that they are no positions.
+    whose names say that they are no positions, unless any vector counts.
     """
     labels = list(labels)
     if any(isinstance(label, tuple) for label in labels):
-        return _best([_split_tuples(labels)])
+        return _best([_split_tuples(labels)], any_vector)
     texts = [str(label).strip() for label in labels]
-    return _best([[_split(text, spelling) for text in texts] for spelling in _SPELLINGS])
+    spellings = [[_split(text, spelling) for text in texts] for spelling in _SPELLINGS]
+    return _best(spellings, any_vector)
 
 
 def find_clock(labels):
@@ -131,7 +132,7 @@ def _split_tuples(labels):
     ]
 
 
-def _gather(splits):
+def _gather(splits, any_vector):
     """The axes, and the columns of each joint that has them all, by axis or quality."""
     seen, columns = Counter(), defaultdict(dict)
     for place, split in enumerate(splits):
@@ -142,7 +143,9 @@ def _gather(splits):
     columns = {
         joint: tails
         for joint, tails in columns.items()
-        if tails.keys() >= {"x", "y"} and "w" not in tails and not _is_no_position(joint[1])
+        if tails.keys() >= {"x", "y"}
+        and "w" not in tails
+        and (any_vector or not _is_no_position(joint[1]))
     }
     n_in_space = sum("z" in tails for tails in columns.values())
     axes = ("xyz" if 2 * n_in_space >= len(columns) else "xy") if columns else ""
@@ -153,10 +156,11 @@ def _is_no_position(joint):
     return _NO_POSITION.fullmatch(re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", joint).lower())
 
 
-def _best(spellings):
+def _best(spellings, any_vector):
     """The columns by that one of several spellings which gives the most joints."""
     axes, columns, splits = max(
-        ((*_gather(splits), splits) for splits in spellings), key=lambda each: len(each[1])
+        ((*_gather(splits, any_vector), splits) for splits in spellings),
+        key=lambda each: len(each[1]),
     )
     joints = [joint for _, joint, _ in columns]
     if all(map(_POSITION.search, joints)):

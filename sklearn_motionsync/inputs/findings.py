@@ -1,5 +1,7 @@
 """What numbers mean: angles that wrap, fill values, tails of zeros, other units, and the like."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -49,6 +51,8 @@ _EXCHANGES = {
     "yzx": (1, 2, 0),
     "zxy": (2, 0, 1),
 }
+# Numbers that a fit looks at together.
+_PORTION = 2**17
 # Frames of a trial that tell its size and its axes.
 _SAMPLED = 16
 # Kinds that a fit warns of: each changes what is learnt.
@@ -236,7 +240,16 @@ def mend_trials(X: TrialsLike, kinds: Sequence[str] = ("wrapping", "zeros at the
 
 def warn_of_findings(trials, names):
     """Warn, in a fit, of findings that change what is learnt; names are None without any."""
-    findings = [each for each in _look(trials, names, cheap=True) if each.kind in _WARNED]
+    # Few trials at a time, which take little memory.
+    portion_of = np.cumsum([x.size for x in trials]) // _PORTION
+    starts = np.flatnonzero(np.diff(portion_of, prepend=-1))
+    findings = {}
+    for start, stop in zip(starts, [*starts[1:], len(trials)], strict=True):
+        for each in _look(trials[start:stop], names, cheap=True):
+            if each.kind in _WARNED:
+                of = each.trial + int(start) if each.feature is None else None
+                findings.setdefault((each.kind, each.feature, of), (start, each))
+    findings = [each._replace(trial=each.trial + int(start)) for start, each in findings.values()]
     by_kind = {kind: [x for x in findings if x.kind == kind] for kind in _WARNED}
     for kind, those in by_kind.items():
         if not those:
@@ -324,8 +337,16 @@ def _look(trials, names, cheap=False):
         constant = np.flatnonzero(numbers.low == numbers.high)
         last = len(trials[0]) - 1
         findings += [Finding("constant", 0, int(k), 0, last, np.nan, len(trials)) for k in constant]
-    findings += [*_ends(numbers, cheap), *_factors(numbers), *_exchanged(numbers)]
+    findings += [*_ends(numbers, cheap), *_factors(numbers)]
+    if not cheap or _are_axes(names):
+        findings += _exchanged(numbers)
     return findings if cheap else findings + [*_other_rates(numbers)]
+
+
+def _are_axes(names):
+    """Whether the first columns are the axes of a joint, by the ends of their names."""
+    ends = [] if names is None else [str(name)[-1:].lower() for name in names[:3]]
+    return ends == ["x", "y", "z"]
 
 
 def _of_feature(kind, numbers, k, rows, value, facts=None):
@@ -393,7 +414,12 @@ def _quality(numbers, names):
         columns = np.flatnonzero(named & inside)
     else:
         is_third = np.arange(width) % 3 == 2
-        shaped = width % 3 == 0 and inside[is_third].all() and (numbers.high[~is_third] > 2).all()
+        shaped = (
+            width % 3 == 0
+            and width > 3
+            and inside[is_third].all()
+            and (numbers.high[~is_third] > 2).all()
+        )
         moves = (numbers.low < numbers.high)[is_third].all()
         columns = np.flatnonzero(is_third) if shaped and moves else []
     last, n = len(numbers.trials[0]) - 1, len(numbers.trials)

@@ -104,13 +104,16 @@ class SequenceLevelMixin:
             check_is_fitted(self)
         return on_rows
 
-    def _check_training_set(self, X, numbers=None):
-        """Check the input of ``fit``: all trials, or some with their numbers."""
+    def _check_training_set(self, X, numbers=None, looks=True):
+        """Check the input of ``fit``: all trials, or some with their numbers.
+
+        Where a confidence hides a part of them, nothing is told of what their numbers mean.
+        """
         trials = check_input(
             self, X, reset=True, level="sequence", numbers=numbers, finite=self._finite
         )
         self._fitted_on_rows = trials.kind == "rows"
-        if not self._fitted_on_rows:
+        if looks and not self._fitted_on_rows:
             warn_of_findings(trials, names_of_input(self))
         return trials
 

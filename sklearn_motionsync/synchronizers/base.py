@@ -426,8 +426,8 @@ class Synchronizer(
 
         ``numbers`` are the indices of a sample of so large a population.
         """
-        trials = with_confidence(self._check_training_set(X, numbers), confidence)
-        filler = None
+        checked = self._check_training_set(X, numbers, looks=confidence is None)
+        trials, filler = with_confidence(checked, confidence), None
         if hold_gaps(trials):
             filler = learn_filler(trials, names_of_input(self))
             trials = fill_trials(filler, trials)

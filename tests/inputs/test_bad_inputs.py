@@ -352,7 +352,7 @@ def test_fit_warns_of_a_clock_among_the_features():
     with pytest.warns(UserWarning, match="Feature 0: increases evenly in every trial"):
         LinearSynchronizer().fit(clocks)
     named = [pd.DataFrame(x, columns=["time", *NAMES]).round(3) for x in clocks]
-    with pytest.warns(UserWarning, match="Feature 'time' .* clock"):
+    with pytest.warns(UserWarning, match="Feature 'time': .* clock"):
         LinearSynchronizer().fit(named)
 
 

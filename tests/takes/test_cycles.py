@@ -460,5 +460,5 @@ def test_float32_is_cut_at_the_same_frames(gait, fitted):
 def test_a_feature_that_counts_the_time_is_warned_of():
     takes = make_gait(2, n_cycles=4, takes=True, random_state=0).data
     timed = [np.column_stack([x, np.arange(len(x)) / 100]) for x in takes]
-    with pytest.warns(UserWarning, match="Feature 4 increases evenly"):
+    with pytest.warns(UserWarning, match="Feature 4: increases evenly"):
         CycleSegmenter(start=0).fit(timed)
