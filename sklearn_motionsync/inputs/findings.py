@@ -247,21 +247,22 @@ def warn_of_findings(trials, names):
     for start, stop in zip(starts, [*starts[1:], len(trials)], strict=True):
         for each in _look(trials[start:stop], names, cheap=True):
             if each.kind in _WARNED:
-                of = each.trial + int(start) if each.feature is None else None
-                findings.setdefault((each.kind, each.feature, of), (start, each))
+                # A feature is told once, in the first trial that shows it.
+                trial = each.trial + int(start) if each.feature is None else None
+                findings.setdefault((each.kind, each.feature, trial), (start, each))
     findings = [each._replace(trial=each.trial + int(start)) for start, each in findings.values()]
     by_kind = {kind: [x for x in findings if x.kind == kind] for kind in _WARNED}
-    for kind, those in by_kind.items():
-        if not those:
+    for kind, alike in by_kind.items():
+        if not alike:
             continue
-        first = those[0]
+        first = alike[0]
         facts = {"first": first.first, "stop": first.last + 1, "value": first.value} | first.facts
         if first.feature is None:
             what = trials.called(first.trial)
-            more = f", and {counted(len(those) - 1, 'other trial')}" if len(those) > 1 else ""
+            more = f", and {counted(len(alike) - 1, 'other trial')}" if len(alike) > 1 else ""
         else:
-            labels = [x.feature if names is None else names[x.feature] for x in those]
-            what = f"Feature {labels[0]!r}" if len(those) == 1 else f"Features {listed(labels)}"
+            labels = [x.feature if names is None else names[x.feature] for x in alike]
+            what = f"Feature {labels[0]!r}" if len(alike) == 1 else f"Features {listed(labels)}"
             where = within(trials.called(first.trial))
             more = "" if kind in ("quality", "clock") else f" in {where}, frame {first.first}"
         warnings.warn(
@@ -482,6 +483,8 @@ def _ends(numbers, cheap):
     still = ~numbers.steps.any(axis=1)
     still_rows = np.add.reduceat(still, numbers.starts)
     missing = np.isnan(numbers.values).all(axis=1) if numbers.is_gappy else None
+    if missing is not None:
+        still &= ~missing
     for i in np.flatnonzero((still_rows > _FEWEST) | (missing is not None)):
         x, start = numbers.trials[i], numbers.starts[i]
         n, frames = len(x), slice(start, start + len(x))

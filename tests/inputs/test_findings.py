@@ -8,8 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
+from sklearn.decomposition import PCA
 from sklearn_motionsync import (
+    ASpace,
     DenseSynchronizer,
+    FrameWise,
     LinearSynchronizer,
     TrialWarning,
     check_trials,
@@ -115,8 +118,13 @@ def test_a_made_fault_is_the_only_finding(name):
 
 @pytest.mark.parametrize(
     "trials",
-    [GAIT, BENDS, [np.asarray(x) for x in make_walk(4, random_state=0).data]],
-    ids=["gait", "bending", "walk"],
+    [
+        GAIT,
+        BENDS,
+        [np.asarray(x) for x in make_walk(4, random_state=0).data],
+        [np.where(np.arange(len(x))[:, np.newaxis] // 9 == 3, np.nan, x) for x in GAIT],
+    ],
+    ids=["gait", "bending", "walk", "gaps"],
 )
 def test_nothing_of_made_movement(trials):
     assert check_trials(trials).empty
@@ -151,7 +159,9 @@ def test_markers_at_zero_in_a_public_set_are_fill_values():
         assert (joint == 0).all()
 
 
-@pytest.mark.parametrize("synchronizer", [LinearSynchronizer(51), DenseSynchronizer(51)])
+@pytest.mark.parametrize(
+    "estimator", [LinearSynchronizer(51), DenseSynchronizer(51), ASpace(), FrameWise(PCA(2))]
+)
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -163,10 +173,10 @@ def test_markers_at_zero_in_a_public_set_are_fill_values():
         ("factor of angles", r"Trial 3: about 57\.3 times .*degrees and radians"),
     ],
 )
-def test_a_fit_warns_once(synchronizer, name, words):
+def test_a_fit_warns_once(estimator, name, words):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        synchronizer.fit(MADE[name][0])
+        estimator.fit(MADE[name][0])
     told = [str(each.message) for each in caught if issubclass(each.category, TrialWarning)]
     assert len(told) == 1
     assert re.match(words, told[0])
