@@ -126,8 +126,10 @@ def refuse_non_numeric(values, what):
     if isinstance(values, pd.Series):
         _refuse_column(values, what)
     elif isinstance(values, pd.DataFrame):
-        for name, column in values.items():
-            _refuse_column(column, f"{what}, column {name!r},")
+        for k, (name, dtype) in enumerate(values.dtypes.items()):
+            # A column takes a copy of all attrs, so only those in question are taken.
+            if dtype.kind not in "biufc":
+                _refuse_column(values.iloc[:, k], f"{what}, column {name!r},")
     elif isinstance(values, np.ndarray) and values.ndim == 2 and values.dtype.kind in "OSU":
         # As from a table.
         for column in values.T:
