@@ -279,15 +279,15 @@ def _format_of(path):
     with path.open("rb") as file:
         head = file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
     ending = path.suffix.lower()
-    fitting = [each for each in FORMATS if each.fits(path, head)]
+    known = next((each for each in FORMATS if each.fits(path, head)), None)
     # Of several formats of text the last, a table, takes what none knows by its content.
-    fitting = fitting or [each for each in FORMATS if ending in each.endings][-1:]
-    if not fitting:
+    known = known or next((x for x in reversed(FORMATS) if ending in x.endings), None)
+    if known is None:
         raise ValueError(
             f"{path} ends with {path.suffix!r}, which no reader is for, and does not begin like a "
             f"format that is known by its content; the known endings are {_join(ENDINGS)}."
         )
-    return fitting[0]
+    return known
 
 
 def _read_file(path, known, options):
