@@ -145,14 +145,27 @@ def gait_events(
     return recordings.stack(tables)
 
 
-def events_of(walk, known=None):
+def events_of(walk: Walk, known=None):
     """The events of a recording by time: label, side, and sample, with a fraction.
 
     Those that are known already, with rows, as from `Recordings.split_events`, are not found anew.
     """
-    if known is None:
-        return _find_events(walk)
-    return [(label, side, row * walk.per_frame) for label, side, row in known]
+    if known is not None:
+        return [(label, side, row * walk.per_frame) for label, side, row in known]
+    strikes = {side: _strikes(walk, side) for side in walk.heels}
+    behind = {
+        side: [(k, is_end) for k, is_end in _farthest(walk, side, points, -1) if not is_end]
+        for side, points in (walk.heels | walk.toes).items()
+    }
+    running = _is_running(walk, strikes, behind)
+    events = [(FOOT_STRIKE, side, k) for side, at in strikes.items() for k in at]
+    events += [
+        (FOOT_OFF, side, k)
+        for side, extremes in behind.items()
+        for k in _offs(walk, side, extremes, running)
+        if _is_seen(walk.heels[side], k)
+    ]
+    return sorted(events, key=lambda event: event[2])
 
 
 def tabulate_events(recordings, i, walk, events):
@@ -166,31 +179,6 @@ def tabulate_events(recordings, i, walk, events):
             "time": recordings.times_at(i, rows),
         }
     )
-
-
-def _find_events(walk: Walk):
-    """The events of a recording by time, from the positions of the feet."""
-    strikes = {side: _strikes(walk, side) for side in walk.heels}
-    behind = {
-        side: [(k, is_end) for k, is_end in _farthest(walk, side, points, -1) if not is_end]
-        for side, points in (walk.heels | walk.toes).items()
-    }
-    running, offs = _is_running(walk, strikes, behind), {}
-    for side, extremes in behind.items():
-        if side not in walk.toes:
-            offs[side] = _off_of_ankle(walk, side, extremes)
-        elif running:
-            offs[side] = _off_of_runner(walk, side, extremes)
-        else:
-            offs[side] = [k for k, _ in extremes]
-    events = [(FOOT_STRIKE, side, k) for side, at in strikes.items() for k in at]
-    events += [
-        (FOOT_OFF, side, k)
-        for side, at in offs.items()
-        for k in at
-        if _is_seen(walk.heels[side], k)
-    ]
-    return sorted(events, key=lambda event: event[2])
 
 
 def _strikes(walk, side):
@@ -218,18 +206,17 @@ def _is_running(walk, strikes, behind):
     return bool(late) and np.median(late) < _RUNNING * walk.rate
 
 
-def _off_of_runner(walk, side, behind):
-    """Samples at which a runner's foot leaves the ground."""
-    rise = walk.filtered(walk.toes[side][:, 1], _ACCELERATION, 2)
-    peak = _DelayedPeak(walk, side, rise, behind, _RUN_OFF)
-    return [peak.after(k) for k, _ in behind]
-
-
-def _off_of_ankle(walk, side, behind):
-    """Samples at which a foot without toes leaves the ground."""
-    rise = walk.filtered(walk.heels[side][:, 1], _ACCELERATION, 1)
-    peak = _DelayedPeak(walk, side, rise, behind, _RISE)
-    return [peak.after(k) + _ANKLE_OFF * walk.rate for k, _ in behind]
+def _offs(walk, side, behind, running):
+    """Samples at which a foot leaves the ground."""
+    if side in walk.toes and not running:
+        return [k for k, _ in behind]
+    if side in walk.toes:
+        rise, expected, later = walk.filtered(walk.toes[side][:, 1], _ACCELERATION, 2), _RUN_OFF, 0
+    else:
+        rise, expected = walk.filtered(walk.heels[side][:, 1], _ACCELERATION, 1), _RISE
+        later = _ANKLE_OFF * walk.rate
+    peak = _DelayedPeak(walk, side, rise, behind, expected)
+    return [peak.after(k) + later for k, _ in behind]
 
 
 class _DelayedPeak:
@@ -272,7 +259,7 @@ class _DelayedPeak:
             self._height = mean[round(peak)]
             share = self._share(expected.spread, many, doubt)
             self.delay += share * (peak + lags[0] - self.delay)
-        self._own = self._share(_WITHIN, 1, doubt)
+        self._share_of_one = self._share(_WITHIN, 1, doubt)
         self._is_clear = self._share(_WITHIN, 1, 0.0) > 0.5
 
     def after(self, k, is_end=False):
@@ -287,7 +274,7 @@ class _DelayedPeak:
             return at if is_high else None
         middle, around = k + self.delay, _AROUND * self._rate
         at = self._peak_between(middle - around, middle + around)
-        return middle if at is None else middle + self._own * (at - middle)
+        return middle if at is None else middle + self._share_of_one * (at - middle)
 
     def _share(self, spread, count, doubt):
         """The weight of the peak of a mean of strides against a prior of this spread."""

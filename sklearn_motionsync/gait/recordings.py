@@ -61,27 +61,26 @@ class Recordings:
     def __init__(self, X, skeleton=None, feet=None, frame_rate=None):
         X = X if skeleton is None else plain_positions(X, skeleton)
         sequences = as_collection(X)
-        self._given = [as_pandas(X)] if sequences is None else sequences
+        self._recordings = [as_pandas(X)] if sequences is None else sequences
         if skeleton is None:
-            first = next(iter(self._given), None)
+            first = next(iter(self._recordings), None)
             if not isinstance(first, pd.DataFrame):
                 raise ValueError(
                     "Arrays do not name their joints: give a skeleton, such as "
                     "Skeleton.from_frame(df) or Skeleton(joints, parents)."
                 )
             skeleton = Skeleton.from_frame(first)
-            self._given = plain_positions(self._given, skeleton)
-        self._checked = check_members(self._given, finite="allow-nan")
-        first = self._given[0]
+            self._recordings = plain_positions(self._recordings, skeleton)
+        self._checked = check_members(self._recordings, finite="allow-nan")
         self.skeleton, self._feet = skeleton, joints_of_feet(skeleton, feet)
-        names = list(first.columns) if isinstance(first, pd.DataFrame) else []
-        check_columns(names, skeleton, self.called(0), self._checked[0].shape[1])
-        facts = TrialFacts.of(self._given, frame_rate)
+        names, width = self._checked.names or (), self._checked[0].shape[1]
+        check_columns(names, skeleton, self.called(0), width)
+        facts = TrialFacts.of(self._recordings, frame_rate)
         self._labels, self.levels = facts.labels, list(facts.levels[:-1])
         self._rates = facts.known_rates().tolist()
         self._check_rates()
-        of_each = self._checked.facts or [{}] * len(self._checked)
-        self._units = [known.get("units") for known in of_each]
+        # Arrays say nothing of their unit.
+        self._units = [known.get("units") for known in self._checked.facts] or [None] * len(self)
 
     def __len__(self):
         return len(self._checked)
@@ -101,22 +100,22 @@ class Recordings:
 
     def frames_at(self, i, rows):
         """The frames of rows of a recording, with fractions, as its index counts."""
-        frames = frames_of_rows(self._given[i])
+        frames = frames_of_rows(self._recordings[i])
         return np.interp(rows, np.arange(len(frames)), frames)
 
     def row_of_frame(self, i, frame):
         """The inverse of `frames_at`; beyond the ends, frames are single steps."""
-        known = frames_of_rows(self._given[i])
+        known = frames_of_rows(self._recordings[i])
         row = np.interp(frame, known, np.arange(len(known)))
         return row + frame - np.clip(frame, known[0], known[-1])
 
     def times_at(self, i, rows):
         """Seconds at rows of a recording."""
-        return times_of_rows(self._given[i], rows, self._rates[i])
+        return times_of_rows(self._recordings[i], rows, self._rates[i])
 
     def row_of_time(self, i, time):
         """The inverse of `times_at`."""
-        return rows_at(self._given[i], time, self._rates[i])
+        return rows_at(self._recordings[i], time, self._rates[i])
 
     def split_events(self, events):
         """The events of a table, by recording: label, side and row; None of each without a table.
@@ -156,7 +155,7 @@ class Recordings:
             if side is None or label not in (FOOT_STRIKE, FOOT_OFF) or pd.isna(value):
                 continue
             at = self.row_of_frame(i, value) if time == "frame" else self.row_of_time(i, value)
-            if not -_MARGIN <= at <= len(self._given[i]) - 1 + _MARGIN:
+            if not -_MARGIN <= at <= len(self._recordings[i]) - 1 + _MARGIN:
                 raise ValueError(
                     f"events: {label} {context} at {time} {value:.6g} is outside of "
                     f"{within(self.called(i))}. Leave its row out, or give the events of these "
