@@ -9,7 +9,7 @@ from scipy.ndimage import grey_opening
 from ..matching.warps import at_times
 from .axes import from_y_up, heading_axes, project_on_axes, to_y_up
 from .formats import LANDMARKS, SIDES
-from .landmarks import as_tuple, guess_feet
+from .landmarks import MIDPOINTS, as_tuple, guess_feet
 from .limbs import (
     LATERAL_LIMBS,
     LIMBS,
@@ -22,13 +22,7 @@ from .limbs import (
 from .skeleton import loose_joints
 from .sphere import mean_direction, mean_length, mean_vector
 
-__all__ = [
-    "Leg",
-    "blend_bodies",
-    "blend_numbers",
-    "find_stances",
-    "hold_feet",
-]
+__all__ = ["blend_bodies", "blend_numbers"]
 
 # A shorter link, in sizes of the body, has no direction.
 _LEAST_LENGTH = 1e-6
@@ -37,8 +31,6 @@ _SAME_LENGTH = 0.01
 # Hips whose horizontal part is smaller, as a share of their length, show no heading: within 17
 # degrees of the vertical it jumps by half a turn. The smallest of 343 real trials is 0.33.
 _LEAST_HORIZONTAL = 0.3
-# The landmark in the middle of a pair.
-_MIDPOINTS = {"hip": "pelvis", "shoulder": "neck"}
 
 
 def blend_numbers(arrays, frames, weights):
@@ -115,35 +107,6 @@ def _blend_path(figures, frames, weights, size):
     return angle, np.concatenate([begin, begin + np.cumsum(steps, axis=0)])
 
 
-def _hold_feet(points, structure, arrays, figures, angle, frames, weights, size):
-    """Points of a blend whose feet stand where those of the trials do.
-
-    Soles go along the floor as those of the trials with positive weights do, each along the
-    heading of its own body. Negative weights do not make feet slip that stand.
-    """
-    floor = weights[:, 0] @ [x.foot.min() for x in figures]
-    weights = np.maximum(weights, 0)
-    weights = weights / weights.sum(axis=0)
-    soles = [p for leg in structure.legs for p in leg.soles]
-    stands, steps, heights, lowest = 0, 0, floor, floor
-    for x, figure, f, w in zip(arrays, figures, frames, weights, strict=True):
-        points_of_trial, between = structure.points_of(x), _between(w)
-        middle = np.clip(_between(f) - 0.5, 0, len(x) - 2)
-        stances = find_stances(points_of_trial, structure.legs, figure.size)
-        stances = np.stack([np.interp(middle, np.arange(len(x) - 1), one) for one in stances])
-        stands = stands + between * stances
-        track, facing = at_times(points_of_trial[:, soles], f), at_times(figure.angle, f)
-        step = _rotate(np.diff(track, axis=0), _between(facing), inverse=True)
-        step = _rotate(step, _between(angle))[..., [0, 2]].transpose(1, 0, 2) / figure.size
-        steps = steps + (between * _between(size))[:, np.newaxis] * step
-        level = (track[..., 1].T - figure.foot.min()) / figure.size
-        heights = heights + w * size * level
-        least = (points_of_trial[:, soles, 1].min(axis=0) - figure.foot.min()) / figure.size
-        lowest = lowest + w * size * least[:, np.newaxis]
-    forward = np.stack([-np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
-    return hold_feet(points, structure.legs, stands, steps, heights, lowest, forward, size)
-
-
 def _between(x):
     """Means of neighbouring frames, along the last axis."""
     return (x[..., 1:] + x[..., :-1]) / 2
@@ -210,7 +173,7 @@ class LinkStructure:
             joints = skeleton.indices_of(name)
             # The mean of several joints is a point of its own.
             self._points[name] = joints[0] if isinstance(at, str) else self._count()
-        for limb in _MIDPOINTS:
+        for limb in MIDPOINTS.values():
             if limb in skeleton.limbs:
                 self._points[limb] = self._count()
         choices = ("pelvis", "hip", "neck", "shoulder", *LANDMARKS)
@@ -271,18 +234,18 @@ class LinkStructure:
         for name, at in skeleton.landmarks.items():
             if not isinstance(at, str):
                 points[:, self._points[name]] = joints[:, skeleton.indices_of(name)].mean(axis=1)
-        for limb in set(_MIDPOINTS) & set(self._points):
+        for limb in set(MIDPOINTS.values()) & set(self._points):
             pair = [self._points[f"{side}_{limb}"] for side in SIDES]
             points[:, self._points[limb]] = points[:, pair].mean(axis=1)
         return points
 
     def _find_links(self):
         points, joints = self._points, self.skeleton.joints
-        pairs = [(m, limb) for limb, m in _MIDPOINTS.items() if {m, limb} <= set(points)]
+        pairs = [(m, limb) for m, limb in MIDPOINTS.items() if {m, limb} <= set(points)]
         n_midpoints = len(pairs)
         for name in self.skeleton.limbs:
             start, end = LIMBS[name][:2]
-            pairs += [(name, start), (name, end)] if name in _MIDPOINTS else [(start, end)]
+            pairs += [(name, start), (name, end)] if name in MIDPOINTS.values() else [(start, end)]
         pairs = [(points[a], points[b]) for a, b in pairs]
         means = [
             (points[name], joints.index(joint))
@@ -443,14 +406,12 @@ class Leg(NamedTuple):
     foot: list
 
 
-def find_stances(points, legs, size):
+def _find_stances(points, soles, size):
     """How much the soles of a recording stand between frames, from 0 to 1: (n_soles, n_frames - 1).
 
-    The points (n_frames, n_points, 3) are y up, and ``size`` is the unit of length of the body. The
-    soles are those of one leg after the other.
+    The points (n_frames, n_points, 3) are y up, and ``size`` is the unit of length of the body.
     """
-    soles = [p for leg in legs for p in leg.soles]
-    heights = (points[1:, soles, 1] + points[:-1, soles, 1]).T / 2
+    heights = _between(points[:, soles, 1].T)
     stands = _fade((heights - heights.min(axis=0)) / size, _LOW, _HIGH)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=2)
     pace = np.quantile(steps.max(axis=1), _FASTEST)
@@ -461,50 +422,56 @@ def find_stances(points, legs, size):
     return grey_opening(stands, size=(1, min(width, stands.shape[1])), mode="nearest")
 
 
-def hold_feet(points, legs, stands, steps, heights, lowest, forward, size):
-    """Points of a body, moved so that soles go as they should while they stand.
+def _hold_feet(points, structure, arrays, figures, angle, frames, weights, size):
+    """Points (n_frames, n_points, 3) of a blend whose feet stand where those of the trials do.
+
+    Soles go along the floor as those of the trials with positive weights do, each along the
+    heading of its own body. Negative weights do not make feet slip that stand.
 
     The body moves as a whole as far as it can, so that knees keep their angles. The rest is left to
     thighs and shanks, which turn and keep their lengths. Everything is linear least squares: where
     a sole goes as it should, nothing moves.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n_frames, n_points, 3)
-        y up.
-    legs : list of Leg
-    stands : ndarray, shape (n_soles, n_frames - 1)
-        As of `find_stances`.
-    steps : ndarray, shape (n_soles, n_frames - 1, 2)
-        Along the floor, as they should be.
-    heights, lowest : ndarray, shape (n_soles, n_frames)
-        As they should be while a sole stands, and below which it never goes.
-    forward : ndarray, shape (n_frames, 3)
-        Unit vectors, to where straight knees bend.
-    size : ndarray, shape (n_frames,)
-
-    Returns
-    -------
-    ndarray, shape (n_frames, n_points, 3)
     """
-    points = points.copy()
-    soles = [p for leg in legs for p in leg.soles]
+    floor = weights[:, 0] @ [x.foot.min() for x in figures]
+    weights = np.maximum(weights, 0)
+    weights = weights / weights.sum(axis=0)
+    soles = [p for leg in structure.legs for p in leg.soles]
+    # Of each sole: how much it stands, its steps, and its heights, below the lowest of which it
+    # never goes.
+    stands, steps, heights, lowest = 0, 0, floor, floor
+    for x, figure, f, w in zip(arrays, figures, frames, weights, strict=True):
+        points_of_trial, between = structure.points_of(x), _between(w)
+        middle = np.clip(_between(f) - 0.5, 0, len(x) - 2)
+        stances = _find_stances(points_of_trial, soles, figure.size)
+        stances = np.stack([np.interp(middle, np.arange(len(x) - 1), one) for one in stances])
+        stands = stands + between * stances
+        track, facing = at_times(points_of_trial[:, soles], f), at_times(figure.angle, f)
+        step = _rotate(np.diff(track, axis=0), _between(facing), inverse=True)
+        step = _rotate(step, _between(angle))[..., [0, 2]].transpose(1, 0, 2) / figure.size
+        steps = steps + (between * _between(size))[:, np.newaxis] * step
+        level = (track[..., 1].T - figure.foot.min()) / figure.size
+        heights = heights + w * size * level
+        least = (points_of_trial[:, soles, 1].min(axis=0) - figure.foot.min()) / figure.size
+        lowest = lowest + w * size * least[:, np.newaxis]
     steps = steps - np.diff(points[:, soles][..., [0, 2]], axis=0).transpose(1, 0, 2)
     heights = heights - points[:, soles, 1].T
-    there = np.pad(stands, [(0, 0), (1, 1)], mode="edge")
-    there = (there[:, 1:] + there[:, :-1]) / 2
-    way, rise = _even(steps, stands, _FLIGHT), _even(heights, there, _CENTRE)
+    standing = _between(np.pad(stands, [(0, 0), (1, 1)], mode="edge"))
+    way, rise = _even(steps, stands, _FLIGHT), _even(heights, standing, _CENTRE)
+    points = points.copy()
     points[1:, :, [0, 2]] += np.cumsum(way, axis=0)[:, np.newaxis]
     points[:, :, 1] += rise[:, np.newaxis]
     steps, heights, first = steps - way, heights - rise, 0
-    for leg in legs:
-        own = slice(first, first + len(leg.soles))
-        first = own.stop
-        x, z = _centred(steps[own], stands[own]).T
-        moved = np.stack([x, _even(heights[own], there[own], _CENTRE), z], axis=1)
+    # Straight knees bend forward.
+    forward = np.stack([-np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+    for leg in structure.legs:
+        soles_of_leg = slice(first, first + len(leg.soles))
+        first = soles_of_leg.stop
+        x, z = _centred(steps[soles_of_leg], stands[soles_of_leg]).T
+        y = _even(heights[soles_of_leg], standing[soles_of_leg], _CENTRE)
+        moved = np.stack([x, y, z], axis=1)
         share = np.linalg.norm(moved, axis=1) / (_LARGEST * size)
         _move_foot(points, leg, moved / np.sqrt(1 + share**2)[:, np.newaxis], forward)
-        sunk = np.maximum(lowest[own] - points[:, leg.soles, 1].T, 0).max(axis=0)
+        sunk = np.maximum(lowest[soles_of_leg] - points[:, leg.soles, 1].T, 0).max(axis=0)
         _move_foot(points, leg, sunk[:, np.newaxis] * [0, 1, 0], forward)
     return points
 
@@ -520,8 +487,8 @@ def _fade(x, low, high):
 
 def _even(values, weights, centre):
     """The mean of values (n_soles, n_frames, ...) by their weights; without any it goes evenly."""
-    own = weights.sum(axis=0) + centre
-    return _solve(own, np.full(len(own) - 1, _EVEN), (weights.T * values.T).T.sum(axis=0))
+    total = weights.sum(axis=0) + centre
+    return _solve(total, np.full(len(total) - 1, _EVEN), (weights.T * values.T).T.sum(axis=0))
 
 
 def _centred(steps, weights):
@@ -532,11 +499,11 @@ def _centred(steps, weights):
     return _solve(rest, pull, -np.diff(force, axis=0, prepend=0, append=0))
 
 
-def _solve(own, pull, right):
-    """Solve for values with the weights ``own``, and of their changes ``pull``: tridiagonal."""
-    bands = np.zeros((2, len(own)))
+def _solve(weights, pull, right):
+    """Solve for values with these weights, and of their changes ``pull``: tridiagonal."""
+    bands = np.zeros((2, len(weights)))
     bands[0, 1:] = -pull
-    bands[1] = own
+    bands[1] = weights
     bands[1, 1:] += pull
     bands[1, :-1] += pull
     return solveh_banded(bands, right)

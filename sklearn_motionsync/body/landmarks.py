@@ -11,6 +11,7 @@ from .formats import FORMATS, LANDMARKS, SIDES
 from .limbs import limbs_between
 
 __all__ = [
+    "MIDPOINTS",
     "add_midpoints",
     "as_tuple",
     "guess_feet",
@@ -75,7 +76,8 @@ _KNOWN = [
     if len(known.landmarks) == len(LANDMARKS)
     and all(isinstance(at, str) for at in known.landmarks.values())
 ]
-_MIDPOINTS = {"pelvis": "hip", "neck": "shoulder"}
+# The landmarks in the middle of a pair.
+MIDPOINTS = {"pelvis": "hip", "neck": "shoulder"}
 
 
 def guess_landmarks(joints, names=(), *, clusters=True):
@@ -84,11 +86,11 @@ def guess_landmarks(joints, names=(), *, clusters=True):
     `names` may list joints of the file that have no columns; their landmarks are left out. Where
     no joint is named, `clusters` of markers on segments stand for landmarks, with a warning.
     """
-    there = {*joints, *names}
+    all_names = {*joints, *names}
     listed = [*joints, *(name for name in names if name not in set(joints))]
     plain = {_plain(name): joint for name, joint in reversed(_without_prefix(listed))}
     for landmarks in _KNOWN:
-        if not set(landmarks.values()) <= there:
+        if not set(landmarks.values()) <= all_names:
             landmarks = {name: plain.get(_plain(joint)) for name, joint in landmarks.items()}
         if None not in landmarks.values():
             return {name: joint for name, joint in landmarks.items() if joint in set(joints)}
@@ -100,16 +102,16 @@ def guess_landmarks(joints, names=(), *, clusters=True):
     # A person is taken before objects with names of their own, but none of two people.
     guess = guesses[-1] if len(guesses) == 1 or len(guesses[-1]) > 2 * len(guesses[-2]) else {}
     if clusters and len(parts) == 1 and not limbs_between(add_midpoints(guess)):
-        found = parts[0].find_clusters()
-        if limbs_between(add_midpoints(found)):
+        middles = parts[0].find_clusters()
+        if limbs_between(add_midpoints(middles)):
             warnings.warn(
                 f"The names tell several markers on each segment, but none at a joint: the middles "
-                f"of {found} stand for these landmarks, so limbs join the middles of segments. "
+                f"of {middles} stand for these landmarks, so limbs join the middles of segments. "
                 "Give landmarks={...} if some of the markers are at joints.",
                 UserWarning,
                 stacklevel=3,
             )
-            return guess | found
+            return guess | middles
     return guess
 
 
@@ -122,7 +124,7 @@ def guess_feet(joints, landmarks):
 
 def add_midpoints(landmarks):
     """Landmarks with a missing pelvis and neck as the means of the hips and the shoulders."""
-    for name, part in _MIDPOINTS.items():
+    for name, part in MIDPOINTS.items():
         pair = [landmarks.get(f"{side}_{part}") for side in SIDES]
         if name not in landmarks and None not in pair:
             landmarks = landmarks | {name: tuple(j for at in pair for j in as_tuple(at))}
@@ -259,12 +261,12 @@ def _entries(text):
             stems = words[0]
             # Stems of a letter or two are too short to name a joint without another word.
             plain = [stem for stem in stems if len(stem) > 2]
-            for some in (*([stem] for stem in stems), stems):
+            for group in (*([stem] for stem in stems), stems):
                 outer, inner = (
-                    [name for stem in some for w in of_it for name in (w + stem, stem + w)]
-                    for of_it in (_OUTER, _INNER)
+                    [name for stem in group for w in places for name in (w + stem, stem + w)]
+                    for places in (_OUTER, _INNER)
                 )
-                entries.append((False, [outer + [stem for stem in some if stem in plain], inner]))
+                entries.append((False, [outer + [stem for stem in group if stem in plain], inner]))
             entries.append((False, [plain + outer]))
         else:
             entries.append((entry.endswith("*"), words))
