@@ -132,18 +132,15 @@ def convert_to_parent_axes(cosines, limbs, *, inverse=False):
     n_dims = cosines.shape[2]
     if n_dims == 2:
         cosines = np.concatenate([cosines, np.zeros_like(cosines[..., :1])], axis=2)
-    axes_of, out = {}, np.zeros_like(cosines)
+    # A limb without an ancestor has the axes of the body.
+    axes_of = {None: np.broadcast_to(np.eye(3, dtype=cosines.dtype), (len(cosines), 3, 3))}
+    out = np.zeros_like(cosines)
     for i, (name, limb) in enumerate(LIMBS.items()):
         if name not in limbs:
             continue
-        cosine, above = cosines[:, i : i + 1], nearest_ancestor(name, limbs)
-        if above is None:
-            local = whole = cosine
-            parent = np.broadcast_to(np.eye(3, dtype=cosines.dtype), (len(cosines), 3, 3))
-        else:
-            parent = axes_of[above]
-            local = cosine if inverse else project_on_axes(cosine, parent)
-            whole = cosine @ parent if inverse else cosine
+        cosine, parent = cosines[:, i : i + 1], axes_of[nearest_ancestor(name, limbs)]
+        local = cosine if inverse else project_on_axes(cosine, parent)
+        whole = cosine @ parent if inverse else cosine
         out[:, i : i + 1] = whole if inverse else local
         axes_of[name] = _swing(limb.rest, local[:, 0]) @ parent
     return out[..., :n_dims]

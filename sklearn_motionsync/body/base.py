@@ -79,10 +79,7 @@ class Portion(NamedTuple):
     @property
     def directions(self):
         """Limbs (n_frames, 12, n_dims) divided by their length; 0 without a length."""
-        lengths = self.lengths
-        if not lengths.all():
-            lengths = np.where(lengths > 0, lengths, 1)
-        return self.limbs / lengths[:, :, np.newaxis]
+        return self.limbs / np.where(self.lengths > 0, self.lengths, 1)[:, :, np.newaxis]
 
     @property
     def axes(self):
@@ -143,21 +140,11 @@ class Body:
         """Medians (12,) of the lengths over the frames that show a limb; NaN without any."""
         return median_lengths(self.lengths)
 
-    @property
-    def size(self):
-        """The unit of length: the stretched leg, or without one the sum of all limbs."""
-        return body_size(self.median_lengths, self._skeleton.limbs)
-
-    def features(self, function):
+    def features(self, function, n_features):
         """Features (n_frames, n_features) that a function gives for every portion."""
-        out = None
+        out = np.empty((len(self.lengths), n_features), self.lengths.dtype)
         for rows in self._slices:
-            part = function(self._portion(rows), self)
-            if len(self._slices) == 1:
-                return part
-            if out is None:
-                out = np.empty((len(self.lengths), part.shape[1]), part.dtype)
-            out[rows] = part
+            out[rows] = function(self._portion(rows), self)
         return out
 
     def _points_and_limbs(self, rows):
@@ -173,37 +160,29 @@ class Body:
     def _portion(self, rows):
         held = self._held if len(self._slices) == 1 else self._points_and_limbs(rows)
         (points, limbs), lengths = held, self.lengths[rows]
-        if not lengths.all():
-            limbs[lengths == 0] = 0
+        limbs[lengths == 0] = 0
         left = None
         if self._left is not None:
             left = self._left[rows]
         elif self._lateral:
-            left = self._directions(self._lateral[0], limbs, rows)
+            left = limbs[:, self._lateral[0]] / lengths[:, self._lateral[0], np.newaxis]
         return Portion(points, limbs, lengths, left)
-
-    def _directions(self, limb, limbs, rows):
-        return limbs[:, limb] / self.lengths[rows, limb, np.newaxis]
 
     def _left_in_gaps(self):
         """Directions (n_frames, 3) to the left, if the first limb that gives them is hidden."""
         if not self._lateral or not np.isnan(self.lengths[:, self._lateral[0]]).any():
             return None
-        directions = [[] for _ in self._lateral]
-        for rows in self._slices:
-            limbs = self._points_and_limbs(rows)[1]
-            for of_limb, k in zip(directions, self._lateral, strict=True):
-                of_limb.append(self._directions(k, limbs, rows))
-        return fill_heading(*map(np.concatenate, directions))
+        limbs = [self._points_and_limbs(rows)[1][:, self._lateral] for rows in self._slices]
+        directions = np.concatenate(limbs) / self.lengths[:, self._lateral, np.newaxis]
+        return fill_heading(*directions.swapaxes(0, 1))
 
     def _check_lengths(self, largest, called):
         """Refuse limbs without length; those that are not there have length 0."""
         lengths, skeleton = self.lengths, self._skeleton
         # A shorter limb is rounding of the largest coordinate.
         zero = lengths <= np.finfo(lengths.dtype).eps * largest
-        there = skeleton.limbs
         for k, name in enumerate(LIMB_NAMES):
-            if name not in there:
+            if name not in skeleton.limbs:
                 lengths[:, k], zero[:, k] = 0, False
             elif skeleton.n_dims == 2 and name in LATERAL_LIMBS:
                 end_on = zero[:, k].copy()
@@ -297,8 +276,8 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin
         """
         check_is_fitted(self, "limb_lengths_")
         trials = self._check(X, reset=False)
-        bodies = (self._body(trials, i) for i in range(len(trials)))
-        features = [body.features(self._features) for body in bodies]
+        bodies, n_features = (self._body(trials, i) for i in range(len(trials))), len(self._names)
+        features = [body.features(self._features, n_features) for body in bodies]
         return restore(self, trials, features)
 
     def __sklearn_tags__(self):
@@ -333,10 +312,17 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin
             )
         return medians
 
-    def _lengths_of(self, body):
-        """Lengths (12,) of the limbs of a body; hidden ones are those of ``fit``, scaled to it."""
+    def _size_of(self, body):
+        """The unit of length: the stretched leg, or without one the sum of all limbs.
+
+        Of limbs that a body never shows, the lengths are those of ``fit``, scaled to it.
+        """
+        size = body_size(body.median_lengths, self.skeleton.limbs)
+        if not np.isnan(size):
+            return size
         learnt = self._all_lengths(self.limb_lengths_)
-        return scale_missing_lengths(body.median_lengths, learnt)
+        lengths = scale_missing_lengths(body.median_lengths, learnt)
+        return body_size(lengths, self.skeleton.limbs)
 
     def _all_lengths(self, lengths):
         """Lengths (12,) of all limbs, 0 of those that the skeleton lacks."""
@@ -345,10 +331,9 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin
         return of_all
 
     def _check(self, X, *, reset):
-        finite = self._finite
         skeleton = self.skeleton
         X = plain_positions(X, skeleton)
-        trials = check_input(self, X, reset=reset, level="pose", finite=finite)
+        trials = check_input(self, X, reset=reset, level="pose", finite=self._finite)
         # Tables have their columns in the order of fit; if it had none, in that of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
         names = names_of_input(self) or column_names(first)

@@ -3,9 +3,9 @@
 import functools
 
 import numpy as np
-import pandas as pd
 
 from ..inputs.columns import find_clock, parse_columns
+from ..inputs.tables import as_pandas
 from ..inputs.wording import counted
 from .formats import AXES
 
@@ -68,8 +68,7 @@ def plain_positions(X, skeleton):
         return [plain_positions(x, skeleton) if hasattr(x, "shape") else x for x in X]
     fitting = columns_of_skeleton(X, skeleton)
     if fitting is not None:
-        table = X if isinstance(X, pd.DataFrame) else pd.DataFrame(X.to_dict(as_series=False))
-        table = table.iloc[:, fitting.places.ravel()]
+        table = as_pandas(X).iloc[:, fitting.places.ravel()]
         return table.set_axis(skeleton.column_names, axis=1)
     shape = getattr(X, "shape", ())
     if len(shape) > 2 and tuple(shape[-2:]) == (len(skeleton.joints), skeleton.n_dims):

@@ -19,7 +19,7 @@ from .limbs import (
     LATERAL_LIMBS,
     LIMB_NAMES,
     LIMBS,
-    leg_length,
+    body_size,
     limb_indices,
     lowest_height,
     unit_vectors,
@@ -266,10 +266,7 @@ class DirectionCosines(PositionsTransformer):
         cosines = cosines[:, limb_indices(limbs)].reshape(len(cosines), -1)
         if not self.skeleton.has_height:
             return cosines
-        leg = leg_length(body.median_lengths, limbs)
-        if np.isnan(leg):
-            leg = leg_length(self._lengths_of(body), limbs)
-        heights = (portion.position_of("pelvis")[:, 1] - body.floor) / leg
+        heights = (portion.position_of("pelvis")[:, 1] - body.floor) / self._size_of(body)
         return np.column_stack([heights, cosines])
 
     def _as_lengths(self, limb_lengths):
@@ -343,7 +340,7 @@ def _forward_kinematics(heights, cosines, lengths, skeleton):
     """
     at = _landmarks_of(heights, cosines, lengths, skeleton.limbs)
     if heights is not None:
-        limit = _LARGEST_SHIFT * leg_length(lengths, skeleton.limbs)
+        limit = _LARGEST_SHIFT * body_size(lengths, skeleton.limbs)
         ankles = [f"{side}_ankle" for side in SIDES if f"{side}_leg" in skeleton.limbs]
         above = lowest_height([at[ankle][:, 1] for ankle in ankles])
         # The floor is unknown if every ankle is hidden.
@@ -369,7 +366,7 @@ def _landmarks_of(heights, cosines, lengths, limbs):
     limb = dict(zip(LIMBS, np.moveaxis(cosines * lengths[:, np.newaxis], 1, 0), strict=True))
     at = {"pelvis": np.zeros_like(limb["hip"])}
     if heights is not None:
-        at["pelvis"][:, 1] = heights * leg_length(lengths, limbs)
+        at["pelvis"][:, 1] = heights * body_size(lengths, limbs)
     # A part that no limb joins to the pelvis begins there.
     at["neck"] = at["pelvis"] + limb["torso"]
     at["head"] = at["neck"] + limb["neck"]

@@ -10,7 +10,6 @@ from sklearn.utils._param_validation import StrOptions
 from .axes import project_on_axes
 from .base import PositionsTransformer
 from .formats import AXES, LANDMARKS, SIDES
-from .limbs import body_size
 from .skeleton import Skeleton
 
 __all__ = ["JointPositions"]
@@ -123,16 +122,13 @@ class JointPositions(PositionsTransformer):
 
     def _features(self, portion, body):
         origin = [portion.position_of(name) for name in _origin_of(self.skeleton)]
-        size = body.size
-        if np.isnan(size):
-            size = body_size(self._lengths_of(body), self.skeleton.limbs)
         # The pelvis is the first landmark, and the origin if it is there.
-        places = (portion.points[:, 1:] - (sum(origin) / len(origin))[:, np.newaxis]) / size
+        middle = (sum(origin) / len(origin))[:, np.newaxis]
+        places = (portion.points[:, 1:] - middle) / self._size_of(body)
         axes = portion.axes if self.reference == "heading" else None
         if axes is not None:
             places = project_on_axes(places, axes)
-        if len(self._landmarks) < places.shape[1]:
-            places = places[:, [LANDMARKS.index(name) - 1 for name in self._landmarks]]
+        places = places[:, [LANDMARKS.index(name) - 1 for name in self._landmarks]]
         return places.reshape(len(places), -1)
 
 

@@ -15,7 +15,6 @@ __all__ = [
     "complete_legs",
     "features_of_parts",
     "landmark_positions",
-    "leg_length",
     "limb_indices",
     "limb_vectors",
     "limbs_between",
@@ -150,18 +149,14 @@ def scale_missing_lengths(lengths, learnt):
     return np.where(seen, lengths, ratio * learnt).astype(lengths.dtype)
 
 
-def leg_length(lengths, limbs=LIMB_NAMES):
-    """Length of the stretched leg: the mean of the complete legs, thigh plus leg."""
-    sides = complete_legs(limbs)
-    parts = [lengths[LIMB_NAMES.index(f"{s}_{p}")] for s in sides for p in ("thigh", "leg")]
-    return sum(parts) / len(sides)
-
-
 def body_size(lengths, limbs):
-    """The unit of length of a body: the stretched leg, or without one the sum of its limbs."""
-    if complete_legs(limbs):
-        return leg_length(lengths, limbs)
-    return sum(lengths[LIMB_NAMES.index(name)] for name in limbs)
+    """The unit of length of a body: the stretched leg, or without one the sum of its limbs.
+
+    The stretched leg is the mean of the complete legs, thigh plus leg.
+    """
+    sides = complete_legs(limbs)
+    parts = [f"{side}_{part}" for side in sides for part in ("thigh", "leg")] or limbs
+    return sum(lengths[LIMB_NAMES.index(name)] for name in parts) / max(len(sides), 1)
 
 
 def lowest_height(heights):

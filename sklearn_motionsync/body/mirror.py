@@ -96,14 +96,9 @@ def _as_positions(x, skeleton, i):
     """Positions (..., n_joints, n_dims) of one trial, or of several in one array."""
     what = f"Trial {i}"
     x = plain_positions(as_pandas(x), skeleton)
-    check_columns(column_names(x) or (), skeleton, what)
     array = as_numbers(x, what)
-    width = skeleton.n_dims * len(skeleton.joints)
-    if array.ndim < 2 or array.shape[-1] != width:
-        raise ValueError(
-            f"{what} has shape {array.shape}, but the positions of the skeleton's "
-            f"{len(skeleton.joints)} joints are (n_frames, {width})."
-        )
+    width = array.shape[-1] if array.ndim > 1 else 1
+    check_columns(column_names(x) or (), skeleton, what, width)
     return array.reshape(*array.shape[:-1], -1, skeleton.n_dims)
 
 
@@ -197,16 +192,12 @@ def _find_by_name(joint, lower):
     """The joint with the name of the other side, or None."""
     name = joint.lower()
     swapped = {"left": "right", "right": "left", "l": "r", "r": "l"}
-    # "left" anywhere; "l" as a word, at the beginning, at the end ...
-    words = ("left|right", r"(?<![a-z0-9])[lr](?![a-z0-9])", "^[lr]", "[lr]$")
-    others = [re.sub(word, lambda match: swapped[match.group()], name) for word in words]
-    # ... or after a prefix that a program put before every name.
-    others += [
-        name[:k] + swapped[letter] + name[k + 1 :]
-        for k, letter in enumerate(name)
-        if k and letter in "lr" and not name[k - 1].isalnum()
+    # "left" anywhere; "l" at the beginning of a word, or at the end.
+    others = [
+        name[: match.start()] + swapped[match.group()] + name[match.end() :]
+        for match in re.finditer("left|right|(?<![a-z0-9])[lr]|[lr]$", name)
     ]
-    return next((lower[other] for other in others if other != name and other in lower), None)
+    return next((lower[other] for other in others if other in lower), None)
 
 
 def _check_middle(arrays, skeleton, alone):
