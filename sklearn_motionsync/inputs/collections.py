@@ -27,7 +27,6 @@ from .facts import facts_of
 from .numbers import (
     FLOATS,
     LARGEST,
-    SMALLEST,
     as_numbers,
     check_finite,
     check_magnitude,
@@ -74,26 +73,15 @@ class Trials(tuple):
 
     The arrays are views of the input where its dtype allows: never write to them.
 
-    Attributes
-    ----------
-    kind : {"rows", "array", "list", "frame"}
-        2-D, 3-D, list, MultiIndex frame.
-    labels : list
-        Of the trials; tuples where several levels name them.
-    frames : list
-        Labels of the frames of each trial of a table; empty where they are numbered.
-    names : sequence of str or None
-        Names of the features; after `check_trials` ``feature_names_in_`` of the estimator.
-    levels : tuple of str
-        Names of the levels of an index; the last is that of the frames.
-    numbers : sequence of int
-        The index of each in all that was given.
-    facts : list of dict
-        What the tables say of each, from `facts_of`; empty without tables.
-    weights : list of ndarray (n_frames_i,), or None
-        Of the frames of each, if gaps were filled.
-    confidence : list of ndarray (n_frames_i, n_features), or None
-        How sure it is what was seen, if that is given.
+    The kind is "rows", "array", "list" or "frame": 2-D, 3-D, a list, or a table with a MultiIndex.
+    The labels are those of the trials, tuples where several levels name them, and ``frames`` the
+    labels of the frames of each trial of a table, empty where they are numbered. ``names`` are
+    those of the features, or None; after `check_trials` they are ``feature_names_in_`` of the
+    estimator. ``levels`` are the names of the levels of an index, of which the last is that of the
+    frames. ``numbers`` are the indices in all that was given, and ``facts`` what the tables say of
+    each, from `facts_of`, empty without tables. ``weights`` (n_frames_i,) are those of the frames
+    of each, if gaps were filled, and ``confidence`` (n_frames_i, n_features) is how sure it is what
+    was seen, if that is given.
     """
 
     kind: str
@@ -198,7 +186,7 @@ def check_members(
 
     for i, x in enumerate(sequences):
         columns = column_names(x) if tables else None
-        if columns != names and _are_same(columns, names):
+        if columns != names and Counter(columns) == Counter(names):
             x, columns = x[names], names
         # For a plain array nothing but NumPy itself is called.
         plain = type(x) is np.ndarray and x.dtype in FLOATS
@@ -213,7 +201,12 @@ def check_members(
         if columns != names and fitted is not None and names is fitted:
             check_names(x, names, what(i))
         elif columns != names:
-            _refuse_columns(columns, names, what(i), within(what(0)))
+            raise ValueError(
+                f"{what(i)} has the columns {listed(columns)}, and {within(what(0))} has "
+                f"{listed(names)}{difference(columns, names)}. All need the same columns: select "
+                "them by x[names]; of files, read_motion(paths, columns='common') leaves out those "
+                "that some lack."
+            )
         arrays.append(array)
         if array.shape[1] != arrays[0].shape[1]:
             turned = all(len(other) == len(arrays[0]) < min(other.shape[1:]) for other in arrays)
@@ -239,9 +232,7 @@ def check_members(
             peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
         if peak > largest:
             largest, holder = peak, i
-    if not SMALLEST <= largest <= LARGEST:
-        holder = what(holder)
-        check_magnitude(largest, holder, training=training)
+    check_magnitude(largest, what(holder), training=training)
     if dtype is None:
         dtype = np.float32 if {a.dtype for a in arrays} == {np.dtype(np.float32)} else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.
@@ -252,22 +243,6 @@ def check_members(
         if not timed:
             warn_of_rows(sequences, what)
     return trials
-
-
-def _are_same(columns, names):
-    """Whether names of columns are the same in another order, each of them once."""
-    if not columns or not names or len(columns) != len(names):
-        return False
-    return len(set(columns)) == len(columns) and set(columns) == set(names)
-
-
-def _refuse_columns(columns, names, what, first):
-    """Say which columns a trial lacks, and which it has besides, by the first one."""
-    raise ValueError(
-        f"{what} has the columns {listed(columns)}, and {first} has {listed(names)}"
-        f"{difference(columns, names)}. All need the same columns: select them by x[names]; of "
-        "files, read_motion(paths, columns='common') leaves out those that some lack."
-    )
 
 
 # -- kinds of collections -----------------------------------------------------------

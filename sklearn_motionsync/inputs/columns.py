@@ -99,8 +99,8 @@ def find_clock(labels):
     texts = [str(label[0] if isinstance(label, tuple) else label).strip() for label in labels]
     frame = next((i for i, text in enumerate(texts) if _FRAME.fullmatch(text)), None)
     for i, text in enumerate(texts):
-        if found := _TIME.fullmatch(text):
-            unit = found["unit"] or (text if text.lower().endswith("seconds") else None)
+        if match := _TIME.fullmatch(text):
+            unit = match["unit"] or (text if text.lower().endswith("seconds") else None)
             return frame, i, None if unit is None else _SECONDS.get(unit.lower(), 1.0)
     return frame, None, None
 

@@ -48,8 +48,7 @@ class Keyframes:
             self._refuse_count(keyframes)
         self._rows, self._rates = list(keyframes), None
         if frame_rate is not None:
-            rates = as_frame_rates(frame_rate, n_sequences)
-            self._rates = np.broadcast_to(rates, (n_sequences, 1))[:, 0]
+            self._rates = as_frame_rates(frame_rate, n_sequences)
 
     def shares(self, trials, count=None):
         """Key-frames (n_sequences, n_keyframes) as shares of the trials, NaN for not known.
@@ -73,7 +72,30 @@ class Keyframes:
 
     def in_order(self, trials):
         """The rows of trials, as they were given."""
-        return self._rows_of([trials.labels[i] for i in range(len(trials))], self._numbers(trials))
+        labels, numbers = list(trials.labels[: len(trials)]), self._numbers(trials)
+        if self._labels is None or labels == list(numbers):
+            # Of trials without labels only their numbers tell another order.
+            all_numbers = list(range(len(self._rows)))
+            if len(all_numbers) != self._count:
+                self._refuse_count(self._rows)
+            if self._labels not in (None, all_numbers) and set(self._labels) == set(all_numbers):
+                raise ValueError(
+                    f"The rows of {self._name} are labelled {self._labels[:8]}: the numbers of the "
+                    f"trials, in another order. Give {self._name}.sort_index(), or, if "
+                    "they are in the order of the trials, "
+                    f"{self._name}.reset_index(drop=True)."
+                )
+            return [self._rows[i] for i in numbers]
+        counts = Counter(self._labels)
+        for place, label in enumerate(labels):
+            if counts[label] != 1:
+                raise ValueError(
+                    f"Trial {place} is labelled {label!r}, and {self._name} has "
+                    f"{counted(counts[label], 'row')} of this label: give one for each trial, or "
+                    f"{self._name}.to_numpy() in the order of the trials."
+                )
+        row_by_label = dict(zip(self._labels, self._rows, strict=True))
+        return [row_by_label[label] for label in labels]
 
     def _numbers(self, trials):
         return trials.numbers if len(trials) < self._count else range(self._count)
@@ -113,32 +135,6 @@ class Keyframes:
                 f"got {row}{unit}."
             )
         return frames / (n_frames - 1)
-
-    def _rows_of(self, labels, numbers):
-        """The rows of trials of these labels and numbers."""
-        if self._labels is None or labels == list(numbers):
-            # Of trials without labels only their numbers tell another order.
-            in_order = list(range(len(self._rows)))
-            if len(in_order) != self._count:
-                self._refuse_count(self._rows)
-            if self._labels not in (None, in_order) and set(self._labels) == set(in_order):
-                raise ValueError(
-                    f"The rows of {self._name} are labelled {self._labels[:8]}: the numbers of the "
-                    f"trials, in another order. Give {self._name}.sort_index(), or, if "
-                    "they are in the order of the trials, "
-                    f"{self._name}.reset_index(drop=True)."
-                )
-            return [self._rows[i] for i in numbers]
-        counts = Counter(self._labels)
-        for place, label in enumerate(labels):
-            if counts[label] != 1:
-                raise ValueError(
-                    f"Trial {place} is labelled {label!r}, and {self._name} has "
-                    f"{counted(counts[label], 'row')} of this label: give one for each trial, or "
-                    f"{self._name}.to_numpy() in the order of the trials."
-                )
-        row_by_label = dict(zip(self._labels, self._rows, strict=True))
-        return [row_by_label[label] for label in labels]
 
     def _refuse_count(self, keyframes):
         raise ValueError(

@@ -1,9 +1,9 @@
 """Array-likes become arrays of floats here; text, dates, masked and complex values are refused."""
 
-import datetime
 import math
 import os
 import re
+from datetime import date, time, timedelta
 from numbers import Integral, Real
 
 import numpy as np
@@ -32,7 +32,7 @@ FLOATS = np.dtype(np.float64), np.dtype(np.float32)
 # far within; squares and fourth powers of such numbers neither overflow nor vanish.
 SMALLEST, LARGEST = 1e-9, 1e9
 
-_TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.timedelta)
+_TIMES = np.datetime64, np.timedelta64, date, time, timedelta, pd.Period
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
 _TEXT = (
     "Give numbers: pd.read_csv(path, decimal=',') reads decimal commas, "
@@ -148,9 +148,8 @@ def _is_masked(values):
 
 
 def _refuse_column(column, what):
-    if column.dtype.kind in "Mm" or isinstance(column.dtype, pd.PeriodDtype):
-        raise ValueError(f"{what} holds dates or durations. {_SECONDS}.")
-    if column.dtype.kind in "OSUT":
+    # Periods are objects, too.
+    if column.dtype.kind in "OSUTMm":
         _refuse_items(column.to_numpy(dtype=object), what, column)
 
 
@@ -179,16 +178,14 @@ def _refuse_items(values, what, column=None):
     """Refuse text, dates and fields in arrays, and in lists of lists."""
     if isinstance(values, np.ndarray):
         kind = values.dtype.kind
-        if kind in "Mm":
-            raise ValueError(f"{what} holds dates or durations ({values.dtype}). {_SECONDS}.")
         if kind == "V":
             raise ValueError(
                 f"{what} is a structured array with {len(values.dtype.names or ())} fields: give "
                 "numpy.lib.recfunctions.structured_to_unstructured(x)."
             )
-        if kind not in "OSU":
+        if kind not in "OSUMm":
             return
-        values = values.ravel().tolist() if kind != "O" else values.flat
+        values = values.ravel().tolist() if kind in "SU" else values.ravel()
     elif not isinstance(values, (list, tuple)):
         values = [values]
     for value in values:

@@ -155,7 +155,7 @@ def is_even(times):
 
 
 def as_frame_rates(frame_rate, n_sequences=None):
-    """Frames a second: one number, or a column of one number for each trial.
+    """Frames a second of each trial (n_sequences,), from one number or one for each.
 
     Without a number of trials any count is right.
     """
@@ -170,4 +170,4 @@ def as_frame_rates(frame_rate, n_sequences=None):
             "frame_rate must be one number above 0, in frames a second, or one for each of the "
             f"{each}, got {reprlib.repr(frame_rate)}{which}."
         )
-    return rate[..., np.newaxis]
+    return rate if n_sequences is None else np.broadcast_to(rate, n_sequences)

@@ -281,12 +281,8 @@ def as_table(x):
         return as_pandas(x)
     frames = next((dim for dim in _TIMES if dim in x.dims), x.dims[0])
     x = x.transpose(frames, ...)
-    rows, columns = (
-        x.indexes[dim] if dim in x.indexes else pd.RangeIndex(n, name=dim)
-        for dim, n in zip(x.dims, x.shape, strict=True)
-    )
-    columns = columns.set_names([None] * columns.nlevels)
-    table = pd.DataFrame(x.values, index=rows, columns=columns)
+    table = x.to_pandas()
+    table.columns = table.columns.set_names([None] * table.columns.nlevels)
     table.attrs = dict(x.attrs)
     levels = {name: value.item() for name, value in x.coords.items() if value.ndim == 0}
     # Of several levels there is a tuple beside its items.

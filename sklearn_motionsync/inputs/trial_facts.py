@@ -112,9 +112,7 @@ class TrialFacts(NamedTuple):
 
     def at(self, frame_rate):
         """The same with a frame rate that is given."""
-        n = len(self.lengths)
-        rates = np.broadcast_to(as_frame_rates(frame_rate, n), (n, 1))[:, 0]
-        return self._replace(frame_rates=rates)
+        return self._replace(frame_rates=as_frame_rates(frame_rate, len(self.lengths)))
 
     @property
     def are_timed(self):
