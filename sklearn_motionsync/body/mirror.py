@@ -193,11 +193,12 @@ def _find_by_name(joint, lower):
     name = joint.lower()
     swapped = {"left": "right", "right": "left", "l": "r", "r": "l"}
     # "left" anywhere; "l" at the beginning of a word, or at the end.
-    others = [
+    others = [re.sub("left|right", lambda match: swapped[match.group()], name)]
+    others += [
         name[: match.start()] + swapped[match.group()] + name[match.end() :]
-        for match in re.finditer("left|right|(?<![a-z0-9])[lr]|[lr]$", name)
+        for match in re.finditer("(?<![a-z0-9])[lr]|[lr]$", name)
     ]
-    return next((lower[other] for other in others if other in lower), None)
+    return next((lower[other] for other in others if other != name and other in lower), None)
 
 
 def _check_middle(arrays, skeleton, alone):
