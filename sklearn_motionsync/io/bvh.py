@@ -46,7 +46,6 @@ def read_bvh(path):
         "parents": parents,
         "positions": place_joints(parents, turning, values, translations),
         "frame_rate": frame_rate,
-        "units": None,
         "up": "y",
         "kind": "joints",
         "rig": {"offsets": offsets[:, :, 0].T.tolist(), "channels": channels},

@@ -2,7 +2,6 @@
 
 import math
 import re
-import warnings
 
 import numpy as np
 
@@ -10,12 +9,13 @@ from ..inputs.resampling import is_rate
 from ..inputs.wording import counted
 from .text import (
     UNSEEN,
+    as_joints,
     check_group,
     decode,
     describe_events,
     describe_groups,
     make_unique,
-    split_subjects,
+    warn,
 )
 
 _BLOCK = 512
@@ -83,14 +83,10 @@ def read_c3d(path, *, group=None):
         values = _read_analog(frames, parameters, n_channels)
         return facts | {"channels": make_unique(channels), "values": values}
     if group == "segments":
-        positions, labels = segments.read_origins(), segments.labels
-        joints, subjects = split_subjects(labels, labels)
-    else:
-        points = members[group][0]
-        positions = _read_points(frames, points, computed=group != "markers")
-        joints, subjects = split_subjects([labels[i] for i in points], labels)
-    facts |= {"joints": joints, "subjects": subjects, "parents": [-1] * len(joints)}
-    return facts | {"positions": positions}
+        return facts | as_joints(segments.labels, segments.read_origins())
+    points = members[group][0]
+    positions = _read_points(frames, points, computed=group != "markers")
+    return facts | as_joints([labels[i] for i in points], positions, labels)
 
 
 # -- the header, and how numbers are written --------------------------------------------
@@ -373,12 +369,10 @@ def _read_scale(file, parameters):
         )
     if math.isclose(scale, header, rel_tol=1e-3):
         return scale
-    warnings.warn(
+    warn(
         f"{file.path.name}: the header says scale {header:g}, which is used, POINT:SCALE says "
         f"{scale:g}. If positions are too large or too small, multiply them by "
-        f"{scale / header:.6g}.",
-        UserWarning,
-        stacklevel=6,
+        f"{scale / header:.6g}."
     )
     return header
 
@@ -425,11 +419,9 @@ def _count_frames(file, stated, frame_bytes, first, end):
     n_frames = (fitting or [filled])[0]
     in_16_bits = {n_frames, n_frames % 2**16, min(n_frames, 2**16 - 1)}
     if n_frames not in stated or not in_16_bits.issuperset(stated):
-        warnings.warn(
+        warn(
             f"{file.path.name}: it says {numbers} frames, and its data hold {n_frames}, which are "
-            "read. Look at the last ones.",
-            UserWarning,
-            stacklevel=6,
+            "read. Look at the last ones."
         )
     return n_frames
 

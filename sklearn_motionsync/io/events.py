@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections import Counter
 from collections.abc import Hashable, Sequence
 from numbers import Real
@@ -32,6 +31,7 @@ from ..inputs.tables import (
 from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import Table, TrialsLike, ValuesLike
 from ..matching.counting import whole
+from .text import warn
 
 __all__ = [
     "cut_at_events",
@@ -142,9 +142,7 @@ def cut_at_events(
         )
     name = name_recording(df)
     if isinstance(events := df.attrs.get("events"), (list, tuple)) and not events:
-        warnings.warn(
-            f"{name} has no events, so no trial is cut out of it.", UserWarning, stacklevel=2
-        )
+        warn(f"{name} has no events, so no trial is cut out of it.")
         return []
     events = _read_events(df, name)
     starts = _select(events, start, "start", name)

@@ -1,6 +1,5 @@
 """Gaps: frames in which a marker was not seen."""
 
-import warnings
 from numbers import Integral
 from typing import Literal
 
@@ -13,6 +12,7 @@ from ..inputs.recorded import Recorded
 from ..inputs.wording import counted
 from ..matching.gaps import interpolate_gaps
 from .events import name_recording
+from .text import warn
 
 # Kinds of what joints are the names of; angles and forces have no positions.
 POSITIONS = ("joints", "markers", "segments", "keypoints")
@@ -202,11 +202,9 @@ def warn_of_gaps(df, name):
     names += ", ..." if len(worst) > 4 else ""
     share = 100 * worst.sum() / (len(df) * n_columns)
     digits = 2 if share < 99 else 3
-    warnings.warn(
+    warn(
         f"{name}: {share:.{digits}g} % of the {what} are missing (NaN), of {len(worst)} of "
-        f"{n_columns} {kind} ({names}){advice}, or drop those columns.",
-        UserWarning,
-        stacklevel=3,
+        f"{n_columns} {kind} ({names}){advice}, or drop those columns."
     )
 
 

@@ -5,7 +5,6 @@ import importlib
 import json
 import math
 import re
-import warnings
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,16 @@ from ..body.formats import FORMATS as BODIES
 from ..inputs.columns import find_clock, parse_columns
 from ..inputs.numbers import listed
 from ..inputs.wording import counted
-from .text import Cells, check_result_size, decode, make_unique, naming, read_cells, split_cells
+from .text import (
+    Cells,
+    check_result_size,
+    decode,
+    make_unique,
+    naming,
+    read_cells,
+    split_cells,
+    warn,
+)
 
 # The first bytes of a file, and those of HDF5.
 _HEAD = 2**16
@@ -111,11 +119,9 @@ def read_openpose(path):
     rows = np.array(frames), subjects, np.stack(values)
     values, _, names = _on_frames(path, size, *rows, present=[*file_of])
     if len(names) > 1:
-        warnings.warn(
+        warn(
             f"{path.name} has up to {len(names)} people in a frame. OpenPose counts them in each "
-            "frame anew, so that a number may stand for different people.",
-            UserWarning,
-            stacklevel=4,
+            "frame anew, so that a number may stand for different people."
         )
     joints = _OPENPOSE.get(values.shape[2]) or [f"point_{k}" for k in range(values.shape[2])]
     # It may be told to write shares of the picture.
@@ -226,8 +232,7 @@ def _assemble(cells, frame=None, **facts):
         facts |= _read_times(cells, time, times, seconds, frames)
     if not columns.joints:
         facts["channels"] = make_unique([str(labels[x]) for x in taken])
-        defaults = {"units": None, "up": None, "kind": "values", "frame_rate": None}
-        return defaults | facts | {"values": values[:, 0]}
+        return {"kind": "values", "values": values[:, 0]} | facts
     if columns.units:
         facts["units"] = "px" if columns.units.startswith("p") else columns.units
     # Of four levels, as of DeepLabCut, the second is the individual.
@@ -258,11 +263,9 @@ def _on_frames(path, size, numbers, subjects, values, present=None):
     if twice.any():
         raise ValueError(f"{path}: frame {numbers[twice.argmax()]:g} comes twice. {_SPLIT}")
     if n_frames > len(present):
-        warnings.warn(
+        warn(
             f"{path.name} skips {counted(n_frames - len(present), 'frame')} after frame "
-            f"{present[:-1][np.diff(present) > step][0]}, whose positions are missing (NaN).",
-            UserWarning,
-            stacklevel=5,
+            f"{present[:-1][np.diff(present) > step][0]}, whose positions are missing (NaN)."
         )
     placed = np.full(shape, np.nan)
     placed[frames, people] = values
@@ -280,11 +283,9 @@ def _read_times(cells, place, times, seconds, frames):
     units = 1 if seconds is None else round(1 / seconds)
     if seconds is None and len(steps) and np.median(steps) > 1:
         units = next(unit for longest, unit in _UNITS.items() if np.median(steps) <= longest)
-        warnings.warn(
+        warn(
             f"{cells.path.name}: the times of {label!r} name no unit, and by their steps of "
-            f"{np.median(steps):g} they count {units:g} a second. If not, give frame_rate=.",
-            UserWarning,
-            stacklevel=5,
+            f"{np.median(steps):g} they count {units:g} a second. If not, give frame_rate=."
         )
     times = times / units
     decimals = (n for n in range(_DECIMALS) if (np.round(times, n) == times).all())
@@ -295,17 +296,16 @@ def _motion(joints, values, confidence, names, of_joints=None, **facts):
     """What a reader of `motion.FORMATS` returns, of (n_frames, n_subjects, n_joints, n_axes)."""
     n_frames, _, n_joints, n_axes = values.shape
     values = values.reshape(n_frames, -1, n_axes).copy()
-    facts = {"units": None, "up": None, "kind": "keypoints", "frame_rate": None} | facts
+    facts = {"kind": "keypoints"} | facts
     if confidence is not None:
         facts["confidence"] = confidence.reshape(n_frames, -1)
         # Zeros without any confidence are joints that were not seen.
         values[(values == 0).all(axis=2) & (facts["confidence"] == 0)] = np.nan
-    if n_axes == 2 and (confidence is not None or facts["units"] == "px"):
+    if n_axes == 2 and (confidence is not None or facts.get("units") == "px"):
         facts["up"] = "-y"
     subjects = [name or of for name in names for of in of_joints or [""] * n_joints]
     joints = list(joints) * len(names) if any(subjects) else make_unique(joints)
-    facts |= {"joints": joints, "parents": [-1] * len(joints), "subjects": subjects}
-    return {"positions": values} | facts
+    return {"joints": joints, "subjects": subjects, "positions": values} | facts
 
 
 # Name, endings, what tells it by path and first bytes, and reader, as `motion.MotionFormat`.

@@ -12,6 +12,7 @@ from ..body.skeleton import find_cycle
 from ..inputs.wording import counted
 from .text import (
     MotionText,
+    as_joints,
     check_group,
     decode,
     describe_events,
@@ -24,7 +25,6 @@ from .text import (
     read_timed_rows,
     split_fields,
     split_rows,
-    split_subjects,
 )
 
 
@@ -35,14 +35,7 @@ def _cells(row, separator=b","):
 def _read_columns(text, rows, columns, n, time_column, separator=b",", what="time"):
     """The numbers in columns of `n`, NaN where a cell is blank, and the decimals of the times."""
     picked = map(operator.itemgetter(*columns), split_rows(text, rows, n, separator))
-    frames, decimals = read_timed_rows(text, picked, time_column, what)
-    return np.frombuffer(b"".join(frames)).reshape(len(frames), -1).copy(), decimals
-
-
-def _as_positions(names, values, known=None):
-    joints, subjects = split_subjects(names, known)
-    facts = {"joints": joints, "subjects": subjects, "parents": [-1] * len(joints)}
-    return facts | {"positions": values.reshape(len(values), len(joints), -1)[:, :, :3].copy()}
+    return read_timed_rows(text, picked, time_column, what)
 
 
 # -- Vicon Nexus: sections below each other, each with its rate, names, axes, units and rows -------
@@ -101,7 +94,7 @@ def read_vicon(path, *, group="markers"):
     values, _ = _read_columns(text, rows, columns, len(axes), 0, separator, "frame")
     times = _read_times(text, values[:, :n_first], rate)
     facts = {
-        "frame_rate": rate, "units": groups[group]["units"], "up": None, "kind": group,
+        "frame_rate": rate, "units": groups[group]["units"], "kind": group,
         "events": describe_events(entries, rate, times[0] * (rate or 1)),
         "first_frame": int(values[0, 0]), "groups": groups,
         "left_out": ", ".join(describe_groups(groups, group, others)),
@@ -114,7 +107,7 @@ def read_vicon(path, *, group="markers"):
         return facts | {"channels": make_unique(names), "values": values}
     # An output of a model is of a subject by the names of the markers.
     known = [x for key, (_, of) in members.items() if not key.startswith("analog") for x, *_ in of]
-    facts |= _as_positions(names, values, known)
+    facts |= as_joints(names, values, known)
     if group.startswith("markers"):
         hide_unseen(facts["positions"])
     return facts
@@ -252,12 +245,12 @@ def read_qtm(path):
             text.check_count(of, text.count(word, decode(stated)), decode(stated), what)
     rate = read_rate(b" ".join(header.get(b"FREQUENCY", [])))
     entries = [(decode(label), "", *numbers_or_nan(text, [at])) for label, _, at in marks]
-    facts = _as_positions(names, values[:, lead:])
+    facts = as_joints(names, values[:, lead:])
     hide_unseen(facts["positions"])
     if lead:
         facts |= {"times": values[:, 1].copy(), "decimals": decimals}
     return facts | {
-        "frame_rate": rate, "units": "mm", "up": None,
+        "frame_rate": rate, "units": "mm",
         "kind": "markers" if noun == "marker" else "joints",
         "first_frame": int(values[0, 0]) if lead and math.isfinite(values[0, 0]) else 1,
         "events": describe_events(entries, rate, values[0, 1] * (rate or 1) if lead else 0.0),
@@ -308,7 +301,7 @@ def read_motive(path, *, group=None):
     if stated := facts.get(key := b"Total Exported Frames"):
         text.check_count(len(values), text.count(stated, decode(key)), decode(key))
     known = [name for of in members.values() for name, *_ in of]
-    motion = _as_positions([name for name, *_ in members[group]], values[:, 2:], known)
+    motion = as_joints([name for name, *_ in members[group]], values[:, 2:], known)
     return motion | {
         "parents": _read_parents(text, members[group], motion["subjects"]),
         "times": values[:, 1].copy(), "decimals": decimals, "frame_rate": rate,

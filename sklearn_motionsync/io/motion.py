@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import warnings
 from collections.abc import Callable, Iterable
 from numbers import Real
 from pathlib import Path as FilePath
@@ -26,7 +25,7 @@ from .gaps import POSITIONS, check_filling, fill_gaps, warn_of_gaps
 from .keypoints import KEYPOINT_FORMATS
 from .labs import QTM, VICON, read_motive, read_qtm, read_vicon
 from .mvnx import read_mvnx
-from .text import FARTHEST, make_unique, read_storage
+from .text import FARTHEST, make_unique, read_storage, warn
 from .trc import read_trc
 
 
@@ -38,13 +37,14 @@ class MotionFormat(NamedTuple):
     It returns a dict with
 
     - ``positions``, floats (n_frames, n_joints, 3) or (n_frames, n_joints, 2), NaN where a joint
-      was not seen, with ``joints`` (unique names) and ``parents`` (indices, -1 for a root); or
-      ``values``, floats (n_frames, n_channels), with ``channels`` (unique names);
+      was not seen, with ``joints`` (unique names) and ``parents`` (indices, -1 for a root, as all
+      are by default); or ``values``, floats (n_frames, n_channels), with ``channels`` (unique
+      names); and ``kind``, what was measured, such as "markers";
     - optionally ``confidence``, floats (n_frames, n_joints), and ``subjects``, a list with the
       subject of each joint or channel, "" where it has none; its name is then no part of the
       names, which are unique within a subject;
-    - ``frame_rate`` (frames per second or None), ``units`` (str, list of str or None), ``up`` ("x",
-      "y", "z", "-x", ... or None) and ``kind`` (what was measured, such as "markers");
+    - what is known of ``frame_rate`` (frames per second), ``units`` (str or list of str) and ``up``
+      ("x", "y", "z", "-x", ...);
     - for formats with a time in each row ``times`` (seconds, not decreasing) and ``decimals`` (how
       many they were written with); ``frame_rate`` is then the rate that the header states;
     - whatever else goes into ``attrs``, as plain Python types: ``left_out`` is a line about what
@@ -210,7 +210,10 @@ def read_motion(
         }  # fmt: skip
         return _read_several(files, columns, options)
     (file,) = files
-    motion = _read_file(file, known, options)
+    motion = {"frame_rate": None, "units": None, "up": None}
+    motion |= _read_file(file, known, options)
+    if "joints" in motion:
+        motion.setdefault("parents", [-1] * len(motion["joints"]))
     _hide_damage(motion, file)
     choose_subject(motion, subject, file)
     confidence = motion.pop("confidence", None)
@@ -321,11 +324,9 @@ def choose_subject(motion, subject, path):
         motion["subject"] = names
         of_each = zip(subjects, motion[what], strict=True)
         motion[what] = make_unique([f"{a}:{b}" if a else b for a, b in of_each])
-        warnings.warn(
+        warn(
             f"{path.name} holds {counted(len(names), 'subject')} {listed(names)}, and the names of "
-            f"joints begin with theirs, as {motion[what][0]!r}. subject={names[0]!r} reads one.",
-            UserWarning,
-            stacklevel=3,
+            f"joints begin with theirs, as {motion[what][0]!r}. subject={names[0]!r} reads one."
         )
 
 
@@ -360,11 +361,9 @@ def _hide_damage(motion, path):
     if kind == "joints" or 2 * damaged.sum() > damaged.size:
         raise ValueError(f"{path}: {found}. {beyond}")
     values[damaged if joints is None else damaged.any(axis=2)] = np.nan
-    warnings.warn(
+    warn(
         f"{path.name}: {found}, the first of {counted(damaged.sum(), 'number')} that become "
-        f"missing (NaN). {beyond}",
-        UserWarning,
-        stacklevel=3,
+        f"missing (NaN). {beyond}"
     )
 
 
@@ -379,7 +378,7 @@ def _read_several(paths, columns, options):
     if not recordings:
         raise refused[0] if refused else ValueError("There are no files to read, got none.")
     for reason in refused:
-        warnings.warn(f"{reason} The file is left out.", UserWarning, stacklevel=3)
+        warn(f"{reason} The file is left out.")
     return _keep_common(recordings) if columns else recordings
 
 
@@ -400,11 +399,9 @@ def _keep_common(recordings):
             "together that have the same joints, markers or channels."
         )
     if losses:
-        warnings.warn(
+        warn(
             f"{len(recordings)} files have {counted(len(common), 'column')} in common. Left out "
-            f"are {listing}.",
-            UserWarning,
-            stacklevel=4,
+            f"are {listing}."
         )
     result = []
     for x in recordings:
@@ -506,22 +503,18 @@ def describe_times(
         facts["frame_rate"] = float(frame_rate)
     elif not even:
         steps = np.diff(times)
-        warnings.warn(
+        warn(
             f"{name}: its times are uneven, in steps of {steps.min():.4g} to {steps.max():.4g} "
             f"{unit}, but frames count as evenly spaced. df.attrs['times'] holds them; "
             "to_trials(df.assign(time=df.attrs['times']), time='time') makes them even. If they "
-            "are even in truth, give frame_rate=.",
-            UserWarning,
-            stacklevel=3,
+            "are even in truth, give frame_rate=."
         )
     elif stated and facts["frame_rate"] not in (None, stated):
         if may_be_thinned and is_thinned(rate, stated):
             return facts
-        warnings.warn(
+        warn(
             f"{name}: it says {stated:g} frames a second, but by its times there are {rate:g}, "
-            "which is used. If the times are wrong, give frame_rate=.",
-            UserWarning,
-            stacklevel=3,
+            "which is used. If the times are wrong, give frame_rate=."
         )
     return facts
 

@@ -3,8 +3,6 @@
 import re
 from xml.etree import ElementTree
 
-import numpy as np
-
 from .text import make_unique, read_rate, read_timed_rows
 
 # The element of a frame that holds a group.
@@ -21,8 +19,7 @@ def read_mvnx(path, *, group="segments"):
     if group not in _GROUPS:
         raise ValueError(f"{path}: there are no {group[:40]} in it; group= reads {[*_GROUPS]}.")
     file = _File(path)
-    rows, decimals = read_timed_rows(file, file.rows(group), time_column=0)
-    values = np.frombuffer(b"".join(rows)).reshape(len(rows), -1)
+    values, decimals = read_timed_rows(file, file.rows(group), time_column=0)
     others = "joint angles" if group == "segments" else "positions of segments"
     poses = "".join(f", the calibration pose {kind!r}" for kind in dict.fromkeys(file.poses))
     facts = {
@@ -41,7 +38,7 @@ def read_mvnx(path, *, group="segments"):
         subjects = [file.subject] * len(channels)
         return facts | {"channels": channels, "values": values, "subjects": subjects}
     facts |= {"joints": file.segments, "subjects": [file.subject] * len(file.segments)}
-    positions = values.reshape(len(rows), -1, 3)
+    positions = values.reshape(len(values), -1, 3)
     return facts | {"parents": file.parents, "positions": positions}
 
 

@@ -6,6 +6,7 @@ import io
 import math
 import os
 import re
+import sys
 import warnings
 from collections import Counter
 from pathlib import Path
@@ -152,11 +153,9 @@ class MotionText:
                 f"{contradiction}, and the last line has no end: the file is not complete. Export "
                 "it again, or remove its last line, which may lack digits."
             )
-        warnings.warn(
+        warn(
             f"{self.path.name}: {contradiction}; what is there is read. If the file is not "
-            "complete, export it again.",
-            UserWarning,
-            stacklevel=5,
+            "complete, export it again."
         )
 
     def check_size(self, n_frames, n_joints):
@@ -167,6 +166,14 @@ class MotionText:
 
     def error(self, message):
         return ValueError(f"{self.path}, line {self.line_number}: {message}")
+
+
+def warn(message):
+    """Warn in the first caller outside of the package."""
+    package, level, frame = __name__.partition(".")[0], 1, sys._getframe()
+    while frame is not None and frame.f_globals.get("__name__", "").startswith(f"{package}."):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, UserWarning, stacklevel=level)
 
 
 def check_group(path, groups, group, others=()):
@@ -271,7 +278,7 @@ def split_rows(text, rows, n, separator=None):
 
 
 def read_timed_rows(text, rows, time_column, what="time"):
-    """The numbers of each row, NaN where one is missing, and how many decimals the times have.
+    """Rows of numbers, NaN where one is missing, and how many decimals the times have.
 
     `rows` yields the fields of one row after the other, as they are read from `text`. The column
     may have the number of the frame in place of its time, or None has neither.
@@ -290,7 +297,7 @@ def read_timed_rows(text, rows, time_column, what="time"):
         result.append(numbers)
     if not result:
         raise text.error("the file ends where frames should follow; it is not complete.")
-    return result, decimals
+    return np.frombuffer(bytearray().join(result)).reshape(len(result), -1), decimals
 
 
 def read_rate(word):
@@ -388,6 +395,13 @@ def split_subjects(names, among=None):
     return markers if any(subjects) else make_unique(markers), subjects
 
 
+def as_joints(names, values, among=None):
+    """The positions of markers and their names, of which `split_subjects` takes the prefixes."""
+    joints, subjects = split_subjects(names, among)
+    positions = values.reshape(len(values), len(joints), -1)[:, :, :3].copy()
+    return {"joints": joints, "subjects": subjects, "positions": positions}
+
+
 def _common_prefix(names):
     """What is before an underscore in every name, without a side, if half of the rest is known."""
     prefix = os.path.commonprefix(names).rpartition("_")[0]  # noqa: RUF071
@@ -461,11 +475,10 @@ def read_storage(path):
     labels = _read_labels(text)
     components = _COMPONENTS.get(header.get(b"datatype"), "")
     rows = _split_rows(text, len(labels), len(components))
-    frames, decimals = read_timed_rows(text, rows, time_column=0)
+    values, decimals = read_timed_rows(text, rows, time_column=0)
     for key, name in ((b"nrows", "nRows"), (b"datarows", "datarows")):
         if key in header:
-            text.check_count(len(frames), text.count(header[key], name), name)
-    values = np.frombuffer(b"".join(frames)).reshape(len(frames), -1)
+            text.check_count(len(values), text.count(header[key], name), name)
     forces = all(any(word in label.lower() for word in _FORCES) for label in labels)
     columns = [f"{a}_{b}" for a in labels for b in components] if components else labels
     return {
@@ -475,7 +488,6 @@ def read_storage(path):
         "decimals": decimals,
         "frame_rate": read_rate(header.get(b"datarate", b"")),
         "units": None if forces else _ANGLE_UNITS.get(header.get(b"indegrees")),
-        "up": None,
         "kind": "forces" if forces else "coordinates",
     }
 

@@ -4,11 +4,10 @@ import itertools
 import math
 import re
 
-import numpy as np
-
 from ..inputs.wording import counted
 from .text import (
     MotionText,
+    as_joints,
     decode,
     hide_unseen,
     quote,
@@ -16,7 +15,6 @@ from .text import (
     read_timed_rows,
     split_fields,
     split_rows,
-    split_subjects,
 )
 
 _AXIS = re.compile(rb"[XYZxyz]\d*")
@@ -34,24 +32,18 @@ def read_trc(path):
     names, row = _read_names(text, header)
     n = 2 + 3 * len(names)
     rows = itertools.chain([row] * bool(row), iter(text.row, b""))
-    frames, decimals = read_timed_rows(text, split_rows(text, rows, n), time_column=1)
-    text.check_count(len(frames), header["numframes"], "NumFrames")
-    values = np.frombuffer(b"".join(frames)).reshape(len(frames), n)
+    values, decimals = read_timed_rows(text, split_rows(text, rows, n), time_column=1)
+    text.check_count(len(values), header["numframes"], "NumFrames")
     text.check_count(len(names), header["nummarkers"], "NumMarkers", "marker")
-    names, subjects = split_subjects(names)
-    number = values[0, 0]
-    return {
-        "joints": names,
-        "subjects": subjects,
-        "parents": [-1] * len(names),
-        "positions": hide_unseen(values[:, 2:].reshape(len(frames), -1, 3).copy()),
+    motion = as_joints(names, values[:, 2:])
+    hide_unseen(motion["positions"])
+    return motion | {
         "times": values[:, 1].copy(),
         "decimals": decimals,
         "frame_rate": header["datarate"],
         "units": header["units"],
-        "up": None,
         "kind": "markers",
-        "first_frame": int(number) if math.isfinite(number) else None,
+        "first_frame": int(values[0, 0]) if math.isfinite(values[0, 0]) else None,
     }
 
 
