@@ -12,7 +12,6 @@ from .text import (
     as_joints,
     check_group,
     decode,
-    describe_events,
     describe_groups,
     make_unique,
     warn,
@@ -63,9 +62,10 @@ def read_c3d(path, *, group=None):
         }
     check_group(file.path, groups, group)
     first_frame = _read_first_frame(file, parameters)
-    # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
-    start = max(first_frame - 1, 0)
-    events, n_untimed = _read_events(file, parameters, rate, start)
+    events = _read_event_parameters(parameters)
+    if events is None:
+        # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
+        events = _read_header_events(file, max(first_frame - 1, 0) / (rate or math.inf))
     facts = {
         "frame_rate": groups[group]["frame_rate"],
         "units": groups[group]["units"],
@@ -74,10 +74,8 @@ def read_c3d(path, *, group=None):
         "first_frame": first_frame,
         "events": events,
         "groups": groups,
-        "left_out": _describe_others(parameters, groups, group, n_untimed),
+        "left_out": _describe_others(parameters, groups, group, events),
     }
-    for event in events if group in ("analog", "segments") and rate is not None else ():
-        event["frame"] *= per_frame if group == "analog" else segments.per_frame
     if group == "analog":
         channels = _read_labels(parameters, "ANALOG", n_channels, "channel")
         values = _read_analog(frames, parameters, n_channels)
@@ -477,19 +475,6 @@ def _read_first_frame(file, parameters):
     return int(start[0]) + (65536 * int(start[1]) if len(start) > 1 else 0)
 
 
-def _read_events(file, parameters, rate, start):
-    """Events by time, and the number of those without a time.
-
-    Each is a dict of its label, its context, its time in seconds of the trial, and its frame
-    in the recording, from 0; None where the frame rate is not known.
-    """
-    entries = _read_event_parameters(parameters)
-    if entries is None:
-        entries = _read_header_events(file, 0.0 if rate is None else start / rate)
-    events = describe_events(entries, rate, start)
-    return events, len(entries) - len(events)
-
-
 def _read_event_parameters(parameters):
     """(label, context, time) of each event of the group EVENT; None without any."""
     group = next((g for g in ("EVENT", "EVENTS") if "TIMES" in parameters.names(g)), "EVENT")
@@ -554,7 +539,7 @@ def _read_point_groups(parameters, labels):
     return {"markers": (list(markers), marker_unit)} | groups
 
 
-def _describe_others(parameters, groups, group, n_untimed):
+def _describe_others(parameters, groups, group, events):
     """The contents of the file beside the group, in one line; empty if there are none."""
     contents = describe_groups({k: x for k, x in groups.items() if k != "segments"}, group, {})
     if "segments" in groups:
@@ -563,6 +548,6 @@ def _describe_others(parameters, groups, group, n_untimed):
     plates = parameters.number("FORCE_PLATFORM", "USED", 0)
     if math.isfinite(plates) and plates > 0:
         contents.append(f"the geometry of {counted(plates, 'force plate')}")
-    if n_untimed:
+    if n_untimed := sum(not math.isfinite(time) for *_, time in events):
         contents.append(f"{counted(n_untimed, 'event')} without a time")
     return ", ".join(contents)

@@ -41,7 +41,6 @@ _STATES = {"nottracked": "0", "inferred": "0.5", "tracked": "1", "true": "1", "f
 # Without a unit, times with steps of at most 1 are seconds, with steps of at most 1000
 # milliseconds, then microseconds, ticks of 100 ns, and nanoseconds.
 _UNITS = {1: 1, 1e3: 1e3, 1e5: 1e6, 1e6: 1e7, math.inf: 1e9}
-_DECIMALS = 9
 _LARGEST_FRAME = 1e12
 _SPLIT = "If it holds several trials, split it: to_trials(pd.read_csv(path), by=..., time=...)."
 
@@ -229,7 +228,7 @@ def _assemble(cells, frame=None, **facts):
     if frame is not None:
         facts["first_frame"] = int(numbers.min())
     if time is not None:
-        facts |= _read_times(cells, time, times, seconds, frames)
+        facts["times"] = _read_times(cells, time, times, seconds, frames)
     if not columns.joints:
         facts["channels"] = make_unique([str(labels[x]) for x in taken])
         return {"kind": "values", "values": values[:, 0]} | facts
@@ -273,7 +272,7 @@ def _on_frames(path, size, numbers, subjects, values, present=None):
 
 
 def _read_times(cells, place, times, seconds, frames):
-    """Times of all frames in seconds, between others where there is no row, and their decimals."""
+    """Times of all frames in seconds, between others where there is no row."""
     label = str(cells.labels[place])[:60]
     first = pd.Series(times).groupby(frames).first()
     times = np.interp(np.arange(frames.max() + 1), first.index, first)
@@ -287,9 +286,7 @@ def _read_times(cells, place, times, seconds, frames):
             f"{cells.path.name}: the times of {label!r} name no unit, and by their steps of "
             f"{np.median(steps):g} they count {units:g} a second. If not, give frame_rate=."
         )
-    times = times / units
-    decimals = (n for n in range(_DECIMALS) if (np.round(times, n) == times).all())
-    return {"times": times, "decimals": next(decimals, 17)}
+    return times / units
 
 
 def _motion(joints, values, confidence, names, of_joints=None, **facts):

@@ -25,7 +25,7 @@ from .gaps import POSITIONS, check_filling, fill_gaps, warn_of_gaps
 from .keypoints import KEYPOINT_FORMATS
 from .labs import QTM, VICON, read_motive, read_qtm, read_vicon
 from .mvnx import read_mvnx
-from .text import FARTHEST, make_unique, read_storage, warn
+from .text import FARTHEST, describe_events, make_unique, read_storage, warn
 from .trc import read_trc
 
 
@@ -45,8 +45,9 @@ class MotionFormat(NamedTuple):
       names, which are unique within a subject;
     - what is known of ``frame_rate`` (frames per second), ``units`` (str or list of str) and ``up``
       ("x", "y", "z", "-x", ...);
-    - for formats with a time in each row ``times`` (seconds, not decreasing) and ``decimals`` (how
-      many they were written with); ``frame_rate`` is then the rate that the header states;
+    - for formats with a time in each row ``times`` (seconds, not decreasing); ``frame_rate`` is
+      then the rate that the header states;
+    - optionally ``events``, triples of label, context ("" without one) and time in seconds;
     - whatever else goes into ``attrs``, as plain Python types: ``left_out`` is a line about what
       was not read.
 
@@ -220,11 +221,12 @@ def read_motion(
     if min_confidence is not None and confidence is not None:
         motion["positions"][confidence < min_confidence] = np.nan
     times = motion.pop("times", None)
+    if "events" in motion:
+        start = (first_time_of(motion) or 0.0) if times is None else times[0]
+        motion["events"] = describe_events(motion["events"], motion["frame_rate"], start)
     if times is not None:
-        stated, decimals = motion["frame_rate"], motion.pop("decimals")
-        motion |= describe_times(
-            file.name, times, stated=stated, decimals=decimals, frame_rate=frame_rate
-        )
+        stated = motion["frame_rate"]
+        motion |= describe_times(file.name, times, stated=stated, frame_rate=frame_rate)
     _set_clock(motion, frame_rate)
     df = _to_frame(motion, file, known)
     if max_gap or ends != "keep":
@@ -470,6 +472,8 @@ _MAX_JITTER = 0.45
 _GAP = 1.9
 # Digits of less than this share of a step show each lost frame.
 _FINE = 0.1
+# Times that need as many digits behind the point, or more, are not rounded.
+_DECIMALS = 9
 # Seconds; no recording has shorter steps.
 _SHORTEST_STEP = 1e-9
 
@@ -479,21 +483,19 @@ def check_frame_rate(frame_rate):
         raise ValueError(f"frame_rate must be frames a second, above 0, got {frame_rate!r}.")
 
 
-def describe_times(
-    name, times, *, stated=None, decimals=17, frame_rate=None, unit="s", may_be_thinned=False
-):
+def describe_times(name, times, *, stated=None, frame_rate=None, unit="s", may_be_thinned=False):
     """The ``attrs`` of a recording that describe its times, which do not decrease.
 
     ``frame_rate`` (None if it is not known), ``first_time`` where seconds are known, ``times``
     where they are uneven. A rate that the file states counts where the times agree with it, as far
-    as the ``decimals`` that they were written with allow. A ``frame_rate`` of the caller replaces
+    as the digits that they were written with allow. A ``frame_rate`` of the caller replaces
     all others. Times in frames give no frame rate. With ``may_be_thinned`` every k-th frame of the
     stated rate is no contradiction.
 
     Warns, in the caller's caller, if times are uneven or contradict the stated rate, and no
     ``frame_rate`` is given.
     """
-    rate, even = _estimate_frame_rate(times, decimals, stated)
+    rate, even = _estimate_frame_rate(times, stated)
     facts = {"frame_rate": rate if unit == "s" else None}
     if unit == "s" or frame_rate is not None:
         facts["first_time"] = float(times[0] / (1 if unit == "s" else frame_rate))
@@ -519,7 +521,7 @@ def describe_times(
     return facts
 
 
-def _estimate_frame_rate(times, decimals, stated):
+def _estimate_frame_rate(times, stated):
     """Frames a second of the times, None where it cannot be estimated, and whether they are even.
 
     The stated rate is returned where the times agree with it.
@@ -529,7 +531,8 @@ def _estimate_frame_rate(times, decimals, stated):
         return stated, len(times) < 2 or stated is not None
     # Times have few digits: 0.033, 0.067, 0.1.
     rate = float(f"{1 / step:.6g}")
-    rounding = 10.0**-decimals
+    decimals = (n for n in range(_DECIMALS) if (np.round(times, n) == times).all())
+    rounding = 10.0 ** -next(decimals, 17)
     # A lost frame makes the mean step longer, and not the median.
     steps = np.diff(times)
     has_gap = steps.max() >= _GAP * max(np.median(steps), rounding)

@@ -278,12 +278,12 @@ def split_rows(text, rows, n, separator=None):
 
 
 def read_timed_rows(text, rows, time_column, what="time"):
-    """Rows of numbers, NaN where one is missing, and how many decimals the times have.
+    """Rows of numbers, NaN where one is missing.
 
     `rows` yields the fields of one row after the other, as they are read from `text`. The column
     may have the number of the frame in place of its time, or None has neither.
     """
-    result, decimals, before = [], 0, -math.inf
+    result, before = [], -math.inf
     for fields in rows:
         numbers = numbers_or_nan(text, fields)
         time = 0.0 if time_column is None else numbers[time_column]
@@ -293,11 +293,10 @@ def read_timed_rows(text, rows, time_column, what="time"):
                 f"got {time:g} after {before:g}."
             )
         before = time
-        decimals = max(decimals, _count_decimals(fields[time_column or 0]))
         result.append(numbers)
     if not result:
         raise text.error("the file ends where frames should follow; it is not complete.")
-    return np.frombuffer(bytearray().join(result)).reshape(len(result), -1), decimals
+    return np.frombuffer(bytearray().join(result)).reshape(len(result), -1)
 
 
 def read_rate(word):
@@ -328,11 +327,6 @@ def _number_or_nan(text, field):
             f"a frame needs numbers, or nothing where one is missing, got {quote([field])}."
         )
     return float(field)
-
-
-def _count_decimals(field):
-    """Digits behind the point of a number as it is written."""
-    return len(field.strip().partition(b".")[2]) if b"e" not in field.lower() else 17
 
 
 def hide_unseen(positions):
@@ -419,7 +413,7 @@ def _common_prefix(names):
 
 
 def describe_events(entries, rate, start):
-    """Events by time, of (label, context, time); `start` is the number of the first frame, from 0.
+    """Events by time, of (label, context, time); `start` is the time of the first frame.
 
     The frame of an event is that of the recording, from 0; None where no frame rate is known.
     """
@@ -428,7 +422,7 @@ def describe_events(entries, rate, start):
             "label": label,
             "context": context or None,
             "time": time,
-            "frame": None if rate is None else round(float(time * rate - start), 5),
+            "frame": None if rate is None else round(float((time - start) * rate), 5),
         }
         # The numbers of a C3D file have 24 bits.
         for label, context, time in ((*texts, round(time, 6)) for *texts, time in entries)
@@ -475,7 +469,7 @@ def read_storage(path):
     labels = _read_labels(text)
     components = _COMPONENTS.get(header.get(b"datatype"), "")
     rows = _split_rows(text, len(labels), len(components))
-    values, decimals = read_timed_rows(text, rows, time_column=0)
+    values = read_timed_rows(text, rows, time_column=0)
     for key, name in ((b"nrows", "nRows"), (b"datarows", "datarows")):
         if key in header:
             text.check_count(len(values), text.count(header[key], name), name)
@@ -485,7 +479,6 @@ def read_storage(path):
         "channels": make_unique(columns),
         "values": values[:, 1:].copy(),
         "times": values[:, 0].copy(),
-        "decimals": decimals,
         "frame_rate": read_rate(header.get(b"datarate", b"")),
         "units": None if forces else _ANGLE_UNITS.get(header.get(b"indegrees")),
         "kind": "forces" if forces else "coordinates",
