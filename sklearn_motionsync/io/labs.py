@@ -259,6 +259,7 @@ def read_qtm(path):
 
 # -- OptiTrack Motive: a line of facts, and columns with a type, a name, an axis and others --------
 
+MOTIVE = re.compile(b'"*Format Version')
 _LENGTHS = {b"meters": "m", b"centimeters": "cm", b"millimeters": "mm", b"inches": "in"}
 _GROUPS = {"bone": "joints", "rigid body": "joints", "marker": "markers"}
 

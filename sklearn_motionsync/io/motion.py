@@ -23,7 +23,7 @@ from .bvh import read_bvh
 from .c3d import read_c3d
 from .gaps import POSITIONS, check_filling, fill_gaps, warn_of_gaps
 from .keypoints import KEYPOINT_FORMATS
-from .labs import QTM, VICON, read_motive, read_qtm, read_vicon
+from .labs import MOTIVE, QTM, VICON, read_motive, read_qtm, read_vicon
 from .mvnx import read_mvnx
 from .text import FARTHEST, describe_events, make_unique, read_storage, warn
 from .trc import read_trc
@@ -90,12 +90,7 @@ FORMATS = [
     MotionFormat(None, (".mvnx",), lambda path, head: b"<mvnx" in head, read_mvnx),
     MotionFormat("vicon", (".csv",), lambda path, head: bool(VICON.search(head)), read_vicon),
     MotionFormat("qtm", (".tsv",), lambda path, head: bool(QTM.match(head)), read_qtm),
-    MotionFormat(
-        "motive",
-        (".csv",),
-        lambda path, head: head.lstrip(b'"').startswith(b"Format Version"),
-        read_motive,
-    ),
+    MotionFormat("motive", (".csv",), lambda path, head: bool(MOTIVE.match(head)), read_motive),
     *(MotionFormat(*each) for each in KEYPOINT_FORMATS),
 ]
 ENDINGS = tuple(ending for each in FORMATS for ending in each.endings)
@@ -211,7 +206,7 @@ def read_motion(
         }  # fmt: skip
         return _read_several(files, columns, options)
     (file,) = files
-    motion = {"frame_rate": None, "units": None, "up": None}
+    motion: dict[str, Any] = {"frame_rate": None, "units": None, "up": None}
     motion |= _read_file(file, known, options)
     if "joints" in motion:
         motion.setdefault("parents", [-1] * len(motion["joints"]))
@@ -227,8 +222,9 @@ def read_motion(
     if times is not None:
         stated = motion["frame_rate"]
         motion |= describe_times(file.name, times, stated=stated, frame_rate=frame_rate)
-    _set_clock(motion, frame_rate)
-    df = _to_frame(motion, file, known)
+    set_clock(motion, frame_rate)
+    name = known.name or file.suffix.lower().removeprefix(".")
+    df = as_recording(motion, name, file.stem, ["recording", FRAME])
     if max_gap or ends != "keep":
         df = fill_gaps(df, max_gap, ends=ends)
     df.attrs["report"] = _report(df)
@@ -256,7 +252,7 @@ def _files_of(path, columns):
     return files, known
 
 
-def _set_clock(motion, frame_rate):
+def set_clock(motion, frame_rate):
     """The time of the first frame; at a new frame rate events are at other times too."""
     if frame_rate is not None:
         motion["frame_rate"] = float(frame_rate)
@@ -421,7 +417,8 @@ def _join(endings):
     return f"{', '.join(before)} and {last}" if before else last
 
 
-def _to_frame(motion, path, known):
+def as_recording(motion, name, trial, levels):
+    """The table of what a reader of the format of this name returned."""
     if "positions" in motion:
         values = motion.pop("positions")
         columns = [
@@ -430,10 +427,9 @@ def _to_frame(motion, path, known):
         values = values.reshape(len(values), -1)
     else:
         values, columns = motion.pop("values"), motion["channels"]
-    index = pd.RangeIndex(len(values), name="frame")
+    index = pd.RangeIndex(len(values), name=FRAME)
     df = pd.DataFrame(values, columns=columns, index=index, copy=False)
-    df.attrs = {"format": known.name or path.suffix.lower().removeprefix(".")} | motion
-    df.attrs |= {"trial": path.stem, "levels": ["recording", FRAME]}
+    df.attrs = {"format": name} | motion | {"trial": trial, "levels": levels}
     return df
 
 

@@ -1,16 +1,16 @@
 """Poses in labelled arrays: key-points that `movement` and other programs track in videos."""
 
-import math
 from collections.abc import Hashable
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from ..inputs.resampling import times_as_numbers
 from ..inputs.tables import FRAME, label_of_part
 from .gaps import fill_gaps
-from .motion import check_confidence, check_frame_rate, describe_times
-from .text import make_unique
+from .motion import as_recording, check_confidence, check_frame_rate, describe_times, set_clock
+from .text import make_unique, read_rate
 
 _DIMENSIONS = ("time", "individual", "keypoint", "space")
 # Older names of some of them.
@@ -104,24 +104,25 @@ def from_poses(
             )
         _, confidence = _arrange(confidence, "confidence", _DIMENSIONS[:3])
         values[np.broadcast_to(confidence < min_confidence, values.shape[:3])] = np.nan
-    up = "-y" if len(axes) == 2 else None
-    facts: dict[str, Any] = {"format": "poses", "units": None, "up": up}
+    joints = make_unique(_read_names(position, "keypoint"))
     times, unit, fps = _read_times(position, attrs)
-    if times is None:
-        facts["frame_rate"] = fps if frame_rate is None else float(frame_rate)
-        facts |= {} if facts["frame_rate"] is None else {"first_time": 0.0}
-    else:
-        facts |= describe_times(
+    motion = {
+        "frame_rate": fps,
+        "units": None,
+        "up": "-y" if len(axes) == 2 else None,
+        "kind": "keypoints",
+        "joints": joints,
+        "parents": [-1] * len(joints),
+    }
+    if times is not None:
+        motion |= describe_times(
             "The poses", times, stated=fps, frame_rate=frame_rate, unit=unit, may_be_thinned=True
         )
-    joints = make_unique(_read_names(position, "keypoint"))
-    facts |= {"kind": "keypoints", "joints": joints, "parents": [-1] * len(joints)}
-    columns = [f"{joint}_{axis}" for joint in joints for axis in sorted(axes)]
-    index = pd.RangeIndex(len(values), name="frame")
+    set_clock(motion, frame_rate)
     recordings = []
     for i, individual in enumerate(_read_names(position, "individual")):
-        df = pd.DataFrame(values[:, i].reshape(len(values), -1), columns=columns, index=index)
-        df.attrs = facts | {"trial": individual, "levels": ("individual", FRAME)}
+        motion["positions"] = values[:, i]
+        df = as_recording(motion, "poses", individual, ("individual", FRAME))
         if trial is not None:
             df.attrs |= label_of_part(trial, individual, "individual")
         recordings.append(df if max_gap == 0 else fill_gaps(df, max_gap))
@@ -188,20 +189,12 @@ def _read_axes(position):
 
 def _read_times(position, attrs):
     """The times or None, their unit ("s" or "frames"), and the frame rate of ``attrs`` or None."""
-    try:
-        fps = float(attrs.get("fps", math.nan))
-    except (TypeError, ValueError):
-        fps = math.nan
-    fps = fps if 0 < fps < math.inf else None
+    fps = read_rate(attrs.get("fps"))
     if "time" not in position.coords:
         return None, None, fps
-    times, unit = position.coords["time"].values, attrs.get("time_unit")
-    if times.dtype.kind in "mM":
-        start = times[0] if times.dtype.kind == "M" else np.timedelta64(0, "s")
-        times, unit = (times - start) / np.timedelta64(1, "s"), "seconds"
-    elif times.dtype.kind not in "fiu":
-        raise ValueError(f"The times of poses must be numbers, got {times.dtype}.")
-    times = times.astype(np.float64)
+    values = position.coords["time"].values
+    unit = "seconds" if values.dtype.kind in "mM" else attrs.get("time_unit")
+    times = times_as_numbers(values, "The coordinate 'time' of poses")
     if not np.isfinite(times).all() or (np.diff(times) < 0).any():
         raise ValueError("The times of poses must increase; sort them by ds.sortby('time').")
     if unit is None:

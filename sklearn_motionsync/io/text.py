@@ -2,11 +2,11 @@
 
 import array
 import contextlib
+import inspect
 import io
 import math
 import os
 import re
-import sys
 import warnings
 from collections import Counter
 from pathlib import Path
@@ -170,7 +170,7 @@ class MotionText:
 
 def warn(message):
     """Warn in the first caller outside of the package."""
-    package, level, frame = __name__.partition(".")[0], 1, sys._getframe()
+    package, level, frame = __name__.partition(".")[0], 1, inspect.currentframe()
     while frame is not None and frame.f_globals.get("__name__", "").startswith(f"{package}."):
         level, frame = level + 1, frame.f_back
     warnings.warn(message, UserWarning, stacklevel=level)
@@ -303,7 +303,7 @@ def read_rate(word):
     """Frames a second as the header states them; None if it states no such number."""
     try:
         rate = float(word)
-    except ValueError:
+    except (TypeError, ValueError):
         return None
     return rate if is_rate(rate) else None
 

@@ -183,7 +183,7 @@ def test_uneven_times_are_kept_with_a_warning(fps, unit, words):
         (poses().isel(space=[0]), {}, r"must hold 'x', 'y' and optionally 'z', got \['x'\]"),
         (poses().isel(time=slice(0)), {}, "position of poses is empty: {'time': 0"),
         (poses().isel(time=slice(None, None, -1)), {}, r"must increase; sort them by ds\.sortby"),
-        (poses(times=np.array(list("ab" * 20))), {}, "times of poses must be numbers, got <U1"),
+        (poses(times=np.array(list("ab" * 20))), {}, "'time' of poses is text, such as 'a'"),
         (poses(unit="ms"), {}, "must be seconds or frames, but .* is 'ms'"),
         (poses().astype(str), {}, "The position of poses must be numbers, got <U"),
         (poses().position, {"min_confidence": 0.5}, "needs a Dataset with the variable 'confid"),
