@@ -170,16 +170,15 @@ def _in_place(points, parents, up):
 
 def _rig_like(like, X, path):
     """The rig of a file, of a table, or of X; None without any."""
-    if like is None:
-        attrs = getattr(X, "attrs", {})
-        joints = attrs.get("joints")
-        names = parse_columns(getattr(X, "columns", ())).joints
-        return Rig.from_attrs(attrs) if joints == names else None
-    table = like if isinstance(like, pd.DataFrame) else read_motion(like)
-    rig = Rig.from_attrs(table.attrs)
-    if rig is None:
+    table = X if like is None else like
+    table = table if isinstance(table, pd.DataFrame) or like is None else read_motion(like)
+    attrs = getattr(table, "attrs", {})
+    rig = attrs.get("rig")
+    if like is not None and rig is None:
         raise ValueError(f"{path}: like= has no rig: give a BVH file, or a table read from one.")
-    return rig
+    if rig is None or (like is None and attrs["joints"] != parse_columns(X.columns).joints):
+        return None
+    return Rig(attrs["joints"], attrs["parents"], rig["offsets"], rig["channels"])
 
 
 def _write_bvh(joints, parents, points, up, rate, rig, path):
@@ -306,17 +305,10 @@ _NO_LENGTH = 1e-6
 
 
 class Rig(NamedTuple):
-    """A tree of joints at rest, y up.
+    """A tree of joints at rest, y up, with offsets from parents, which come before their children.
 
-    Attributes
-    ----------
-    joints : list of str
-    parents : list of int
-        Index of each joint's parent, which comes before it; -1 for roots.
-    offsets : list of list of float
-        From the parent of a joint to the joint, at rest.
-    channels : list of list of str
-        Such as ``["Xposition", ..., "Zrotation", ...]``, of each joint; none of an end site.
+    Channels are such as ``["Xposition", ..., "Zrotation", ...]``, of each joint; none of an end
+    site.
     """
 
     joints: list
@@ -335,14 +327,6 @@ class Rig(NamedTuple):
     def is_end(self, j):
         """Whether a joint is an end site, which neither turns nor moves."""
         return not self.channels[j] and j not in self.parents
-
-    @classmethod
-    def from_attrs(cls, attrs):
-        """The rig in the ``attrs`` of a table; None without one."""
-        rig = attrs.get("rig")
-        if rig is None:
-            return None
-        return cls(attrs["joints"], attrs["parents"], rig["offsets"], rig["channels"])
 
 
 def add_middles(joints, parents, points):
@@ -382,22 +366,23 @@ def make_rig(joints, parents, points):
     """
     turns = ["Zrotation", "Xrotation", "Yrotation"]
     moves = ["Xposition", "Yposition", "Zposition"]
-    rig, new = Rig([], [], [], []), {-1: -1}
+    rig = Rig([], [], [], [])
 
     def add(name, parent, offset, channels):
         for values, value in zip(rig, (name, parent, offset, channels), strict=True):
             values.append(value)
         return len(rig.joints) - 1
 
-    for j in _parents_first(parents):
-        above = new[parents[j]]
-        if parents[j] < 0:
-            new[j] = add(joints[j], -1, points[0, j].tolist(), moves + turns)
-            continue
-        if parents.count(parents[j]) > 1:
+    def hang(j, above):
+        offset = points[0, j] - (points[0, parents[j]] if above >= 0 else 0)
+        if above >= 0 and parents.count(parents[j]) > 1:
             above = add(f"{joints[j]}_pivot", above, [0.0] * 3, turns)
-        offset = (points[0, j] - points[0, parents[j]]).tolist()
-        new[j] = add(joints[j], above, offset, turns)
+        above = add(joints[j], above, offset.tolist(), turns if above >= 0 else moves + turns)
+        for child in np.flatnonzero(np.equal(parents, j)).tolist():
+            hang(child, above)
+
+    for root in np.flatnonzero(np.less(parents, 0)).tolist():
+        hang(root, -1)
     return rig
 
 
@@ -487,16 +472,6 @@ def _reach_hinge(rig, offsets, points, held, start, above, turn):
     return Rotation.from_rotvec(bone * twist[:, np.newaxis]).as_matrix() @ turn
 
 
-def _parents_first(parents):
-    """Joints, each after its parent and before what is not below it."""
-    order, stack = [], [j for j, parent in enumerate(parents) if parent < 0][::-1]
-    while stack:
-        j = stack.pop()
-        order.append(j)
-        stack += [k for k, parent in enumerate(parents) if parent == j][::-1]
-    return order
-
-
 def _fit_lengths(rig, points):
     """The offsets, with the median lengths of bones where those of the rig differ."""
     offsets = np.array(rig.offsets, dtype=np.float64)
@@ -530,15 +505,10 @@ def _rotation(rest, ways):
 
 def _smallest(start, ends):
     """The smallest rotations (n_frames, 3, 3) from a unit vector to others (n_frames, 3)."""
-    axis, cosine = np.cross(start, ends), ends @ start
+    axis, real = np.cross(start, ends), 1 + ends @ start
     # Opposite vectors turn about any normal.
-    other = np.cross(start, np.eye(3)[np.abs(start).argmin()])
-    other /= np.linalg.norm(other)
-    opposite = cosine < -1 + 1e-12
-    angle = np.arctan2(np.linalg.norm(axis, axis=1), cosine)
-    size = np.linalg.norm(axis, axis=1, keepdims=True)
-    axis = np.where(opposite[:, np.newaxis], other, axis / np.where(size > 0, size, 1))
-    return Rotation.from_rotvec(axis * angle[:, np.newaxis]).as_matrix()
+    axis[real < 1e-12] = np.cross(start, np.eye(3)[np.abs(start).argmin()])
+    return Rotation.from_quat(np.column_stack([axis, real])).as_matrix()
 
 
 def _angles(order, turn):
