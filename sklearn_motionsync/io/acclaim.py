@@ -277,12 +277,9 @@ def _place_bones(bones, in_degrees, values, degrees):
     shifts = at_rest.copy()
     shifts[:, :, 0] = np.eye(3)
     channels = [[(kind, axis.upper()) for kind, axis in bone.dofs] for bone in bones]
-    (axes, moved, columns), turning = split_channels(channels)
+    (axes, moved, columns), turns = split_channels(channels)
     # Degrees of freedom act in their order, about fixed axes.
-    turning = {
-        order[::-1]: [(j, columns[::-1]) for j, columns in members]
-        for order, members in turning.items()
-    }
+    turns = [(names[::-1], columns[::-1]) for names, columns in turns]
 
     def translations(values):
         steps = np.zeros((3, len(bones), len(values)))
@@ -290,18 +287,16 @@ def _place_bones(bones, in_degrees, values, degrees):
         return rotate(shifts[..., None], steps) + start
 
     return place_joints(
-        parents, turning, values, translations, degrees=degrees, at_rest=at_rest, bones=far_ends
+        parents, turns, values, translations, degrees=degrees, at_rest=at_rest, bones=far_ends
     )
 
 
 def _own_axes(bones, in_degrees):
     """C (3, 3, n_bones)."""
-    axes = np.repeat(np.eye(3)[:, :, None], len(bones), axis=2)
-    for order in {bone.axis_order for bone in bones}:
-        members = [j for j, bone in enumerate(bones) if bone.axis_order == order]
-        angles = np.array([bones[j].axis for j in members]).T[::-1]
-        turned = axes[:, :, members]
+    axes = []
+    for bone in bones:
+        angles = np.array(bone.axis)[::-1]
         # Rotations about fixed axes are those about turning axes in the opposite order.
-        turn(turned, order[::-1].upper(), np.radians(angles) if in_degrees else angles)
-        axes[:, :, members] = turned
-    return axes
+        names = bone.axis_order[::-1].upper()
+        axes.append(turn(np.eye(3), names, np.radians(angles) if in_degrees else angles))
+    return np.stack(axes, axis=2)

@@ -32,7 +32,7 @@ def read_bvh(path):
         [f"{name[:1].decode()}{name[1:].decode().lower()}" for name in joint.channels or ()]
         for joint in joints
     ]
-    (axes, moved, columns), turning = split_channels(
+    (axes, moved, columns), turns = split_channels(
         [[("t" if name.endswith("position") else "r", name[0]) for name in of] for of in channels]
     )
 
@@ -44,7 +44,7 @@ def read_bvh(path):
     return {
         "joints": make_unique([joint.name for joint in joints]),
         "parents": parents,
-        "positions": place_joints(parents, turning, values, translations),
+        "positions": place_joints(parents, turns, values, translations),
         "frame_rate": frame_rate,
         "up": "y",
         "kind": "joints",
