@@ -238,15 +238,18 @@ def mend_trials(X: TrialsLike, kinds: Sequence[str] = ("wrapping", "zeros at the
     ]
 
 
-def warn_of_findings(trials, names):
-    """Warn, in a fit, of findings that change what is learnt; names are None without any."""
+def warn_of_findings(trials, names, *, clocks=True):
+    """Warn, in a fit, of findings that change what is learnt; names are None without any.
+
+    Of clocks only where trials are matched: a body that walks goes on evenly, too.
+    """
     # Few trials at a time, which take little memory.
     portion_of = np.cumsum([x.size for x in trials]) // _PORTION
     starts = np.flatnonzero(np.diff(portion_of, prepend=-1))
     findings = {}
     for start, stop in zip(starts, [*starts[1:], len(trials)], strict=True):
         for each in _look(trials[start:stop], names, cheap=True):
-            if each.kind in _WARNED:
+            if each.kind in _WARNED and (clocks or each.kind != "clock"):
                 # A feature is told once, in the first trial that shows it.
                 trial = each.trial + int(start) if each.feature is None else None
                 findings.setdefault((each.kind, each.feature, trial), (start, each))

@@ -231,7 +231,7 @@ def check_input(
         _warn_of_exchanged_axes(out)
     check_facts(estimator, out.facts, out.called, reset=reset, which=facts)
     if reset and level == "pose":
-        warn_of_findings(out, names_of_input(estimator))
+        warn_of_findings(out, names_of_input(estimator), clocks=False)
     return out
 
 
