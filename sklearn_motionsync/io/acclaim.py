@@ -1,6 +1,5 @@
 """Acclaim: an ASF file with the skeleton, and AMC files with its motion."""
 
-import array
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -109,7 +108,7 @@ def _read_root(text, words, root):
     elif key == b"axis":
         root.axis_order = _read_order(text, words[1:])
     elif key == b"position":
-        root.offset = np.array(text.numbers(words[1:], 3, ":root position"))
+        root.offset = text.numbers(words[1:], 3, ":root position")
     elif key == b"orientation":
         root.axis = text.numbers(words[1:], 3, ":root orientation")
 
@@ -199,7 +198,7 @@ def _read_amc(text, bones, in_degrees, asf):
     n_dofs = {bone.name: len(bone.dofs) for bone in bones}
     moving = [name for name, n in n_dofs.items() if n]
     header = {"degrees": in_degrees, "frame_rate": None}
-    values, n_frames = array.array("d"), 0
+    frames = []
     for number, frame in _frames(text, n_dofs, header, asf):
         if len(frame) < len(moving):
             lost = next(name for name in moving if name not in frame)
@@ -207,13 +206,11 @@ def _read_amc(text, bones, in_degrees, asf):
                 f"frame {number} has no values of {lost[:60]!r}, which {asf.name} gives some; the "
                 "file is not complete, or asf= is not its skeleton."
             )
-        for name in moving:
-            values.extend(frame[name])
-        n_frames += 1
-    if not n_frames:
+        frames.append(b"".join(frame[name] for name in moving))
+    if not frames:
         raise text.error("the file ends without a frame; each begins with its number.")
-    header["first_frame"] = number - n_frames + 1
-    return np.frombuffer(values).reshape(n_frames, -1), header
+    header["first_frame"] = number - len(frames) + 1
+    return np.frombuffer(b"".join(frames)).reshape(len(frames), -1), header
 
 
 def _frames(text, n_dofs, header, asf):
