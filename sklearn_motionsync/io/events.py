@@ -136,10 +136,6 @@ def cut_at_events(
     >>> [(event["label"], event["frame"]) for event in cycle.attrs["events"]]
     [('Foot Off', 31.0)]
     """
-    if not isinstance(df, pd.DataFrame):
-        raise ValueError(
-            f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}."
-        )
     name = name_recording(df)
     if isinstance(events := df.attrs.get("events"), (list, tuple)) and not events:
         warn(f"{name} has no events, so no trial is cut out of it.")
@@ -163,7 +159,12 @@ def cut_at_events(
 
 
 def name_recording(df):
-    """The name of a recording in messages."""
+    """The name of a recording in messages; what is no table is refused."""
+    if not isinstance(df, pd.DataFrame):
+        raise ValueError(
+            f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}; "
+            "name the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
+        )
     label = df.attrs.get("trial")
     return "The recording" if label is None else f"The recording {str(label)[:60]!r}"
 

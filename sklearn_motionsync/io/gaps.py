@@ -210,14 +210,10 @@ def warn_of_gaps(df, name):
 
 def _read(df):
     """The columns of the joints, and a copy of their positions, joint by joint."""
-    if not isinstance(df, pd.DataFrame):
-        raise ValueError(
-            f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}; "
-            "name the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
-        )
+    name = name_recording(df)
     if "channels" in df.attrs:
         raise ValueError(
-            f"{name_recording(df)} has no positions but {df.attrs.get('kind', 'channels')}: "
+            f"{name} has no positions but {df.attrs.get('kind', 'channels')}: "
             "max_gap and ends go with positions."
         )
     columns = joint_columns(df)
@@ -228,9 +224,8 @@ def _read(df):
             "df.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=10)."
         )
     positions = df.iloc[:, columns.places.ravel()]
-    values = np.array(as_numbers(positions, name_recording(df), dtype=np.float64))
-    names = list(positions.columns)
-    check_finite(values, f"{name_recording(df)}, frame", names, allow_nan=True)
+    values = np.array(as_numbers(positions, name, dtype=np.float64))
+    check_finite(values, f"{name}, frame", list(positions.columns), allow_nan=True)
     return columns, values
 
 
