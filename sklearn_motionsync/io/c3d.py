@@ -10,7 +10,7 @@ from ..inputs.wording import counted
 from .text import (
     UNSEEN,
     as_joints,
-    check_group,
+    choose_group,
     decode,
     describe_groups,
     make_unique,
@@ -60,20 +60,16 @@ def read_c3d(path, *, group=None):
             "units": [unit or None for unit in units],
             "frame_rate": None if rate is None else rate * per_frame,
         }
-    check_group(file.path, groups, group)
+    facts = choose_group(file.path, groups, group, {})
     first_frame = _read_first_frame(file, parameters)
     events = _read_event_parameters(parameters)
     if events is None:
         # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
         events = _read_header_events(file, max(first_frame - 1, 0) / (rate or math.inf))
-    facts = {
-        "frame_rate": groups[group]["frame_rate"],
-        "units": groups[group]["units"],
+    facts |= {
         "up": {"+Y": "y", "+Z": "z"}.get(parameters.text("POINT", "Y_SCREEN")),
-        "kind": group,
         "first_frame": first_frame,
         "events": events,
-        "groups": groups,
         "left_out": _describe_others(parameters, groups, group, events),
     }
     if group == "analog":

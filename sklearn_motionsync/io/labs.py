@@ -13,9 +13,8 @@ from ..inputs.wording import counted
 from .text import (
     MotionText,
     as_joints,
-    check_group,
+    choose_group,
     decode,
-    describe_groups,
     hide_unseen,
     make_unique,
     numbers_or_nan,
@@ -85,19 +84,14 @@ def read_vicon(path, *, group="markers"):
         if not name.startswith("analog"):
             units = units[0] if len(set(units)) == 1 else None
         groups[name] = {"n": len(of), "units": units, "frame_rate": rate}
-    check_group(path, groups, group)
+    facts = choose_group(path, groups, group, others)
     (rate, axes, lines), of = members[group]
     n_first = 1 + axes[1].lower().startswith(b"sub")
     columns = [*range(n_first), *(j for _, at, _ in of for j in at)]
     rows = (line for text.line_number, text.is_whole, line in lines)
     values = _read_columns(text, rows, columns, len(axes), 0, separator, "frame")
     times = _read_times(text, values[:, :n_first], rate)
-    facts = {
-        "frame_rate": rate, "units": groups[group]["units"], "kind": group,
-        "events": entries,
-        "first_frame": int(values[0, 0]), "groups": groups,
-        "left_out": ", ".join(describe_groups(groups, group, others)),
-    }  # fmt: skip
+    facts |= {"events": entries, "first_frame": int(values[0, 0])}
     if rate is not None:
         facts["times"] = times
     names, values = [name for name, *_ in of], values[:, n_first:]
@@ -293,7 +287,7 @@ def read_motive(path, *, group=None):
     units = _LENGTHS.get(units.lower(), decode(units) or None)
     groups = {of: {"n": len(x), "units": units, "frame_rate": rate} for of, x in members.items()}
     group = group or ("joints" if members["joints"] else "markers")
-    check_group(path, groups, group, [noun for noun, n in others.items() if n])
+    chosen = choose_group(path, groups, group, others)
     if group == "joints" and facts.get(b"Coordinate Space", b"").lower() == b"local":
         raise text.error("positions are those in the parent bone; export them as Global.")
     columns = [0, 1, *(j + k for _, j, *_ in members[group] for k in range(3))]
@@ -302,12 +296,10 @@ def read_motive(path, *, group=None):
         text.check_count(len(values), text.count(stated, decode(key)), decode(key))
     known = [name for of in members.values() for name, *_ in of]
     motion = as_joints([name for name, *_ in members[group]], values[:, 2:], known)
-    return motion | {
+    return chosen | motion | {
         "parents": _read_parents(text, members[group], motion["subjects"]),
-        "times": values[:, 1].copy(), "frame_rate": rate,
-        "units": units, "up": "y", "kind": group, "groups": groups,
+        "times": values[:, 1].copy(), "up": "y",
         "first_frame": int(values[0, 0]) if math.isfinite(values[0, 0]) else None,
-        "left_out": ", ".join(describe_groups(groups, group, others)),
     }  # fmt: skip
 
 

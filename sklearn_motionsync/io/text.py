@@ -176,14 +176,21 @@ def warn(message):
     warnings.warn(message, UserWarning, stacklevel=level)
 
 
-def check_group(path, groups, group, others=()):
-    """Refuse a group of which a file has no members; `others` counts what is in no group."""
+def choose_group(path, groups, group, others):
+    """The facts of a group of a file, which must have members; `others` counts what is in none."""
     if group in groups and groups[group]["n"]:
-        return
+        return {
+            "kind": group,
+            "units": groups[group]["units"],
+            "frame_rate": groups[group]["frame_rate"],
+            "groups": groups,
+            "left_out": ", ".join(describe_groups(groups, group, others)),
+        }
     there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
+    unread = "".join(f", not its {counted(n, noun)}" for noun, n in others.items() if n)
     raise ValueError(
         f"{path}: there are no {group[:40]} in this file; read_motion(..., group=...) reads "
-        f"{', '.join(there)[:300] or 'none'}{''.join(f', not its {x}s' for x in others)[:200]}."
+        f"{', '.join(there)[:300] or 'none'}{unread[:200]}."
     )
 
 

@@ -246,7 +246,7 @@ def test_markers_of_motive_are_a_group_of_a_file_with_bones(tmp_path):
     np.testing.assert_array_equal(alone, df)
     assert alone.attrs["units"] == "mm"
     path = put(tmp_path, motive(more[3:], values[:, 24:]), "c.csv")
-    with pytest.raises(ValueError, match=r"c\.csv: there are no markers .* not its unlabelled m"):
+    with pytest.raises(ValueError, match=r"c\.csv: there are no markers .* not its 1 unlabelled m"):
         read_motion(path)
 
 
