@@ -22,6 +22,8 @@ _TURNS = [(-180.0, 180.0, "degrees"), (0.0, 360.0, "degrees")]
 _TURNS += [(-np.pi, np.pi, "radians"), (0.0, 2 * np.pi, "radians")]
 # A jump from one limit of a turn to the other is of so much of it, and ends this near to them.
 _JUMP, _NEAR = 0.75, 0.08
+# Jumps are at most such a share of all steps.
+_RARE = 0.1
 # Numbers that programs write where nothing was seen.
 _FILLS = 0.0, -1.0, 999.0, 9999.0, 99999.0, -999.0, -9999.0, 9999999.0
 # A fill value is left, or reached, by a step of so much of the range of the other values, which
@@ -371,6 +373,8 @@ def _wrapping(numbers):
         for k in np.flatnonzero(inside & (largest > _JUMP * period)):
             x, steps = numbers.values[:, k], numbers.steps[:, k]
             rows = np.flatnonzero(steps > _JUMP * period)
+            if len(rows) > _RARE * len(x):
+                continue
             pairs = np.stack([x[rows], x[rows + 1]])
             ends = (pairs.min(axis=0) < low + slack) & (pairs.max(axis=0) > high - slack)
             usual = np.quantile(steps[steps <= _JUMP * period], 0.99)

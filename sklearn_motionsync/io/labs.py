@@ -31,7 +31,7 @@ def _cells(row, separator=b","):
 
 
 def _read_columns(text, rows, columns, n, time_column, separator=b",", what="time"):
-    """The numbers in columns of `n`, NaN where a cell is blank."""
+    """The numbers in columns of `n`, NaN where a cell is blank, and the decimals of the times."""
     picked = map(operator.itemgetter(*columns), split_rows(text, rows, n, separator))
     return read_timed_rows(text, picked, time_column, what)
 
@@ -89,11 +89,11 @@ def read_vicon(path, *, group="markers"):
     n_first = 1 + axes[1].lower().startswith(b"sub")
     columns = [*range(n_first), *(j for _, at, _ in of for j in at)]
     rows = (line for text.line_number, text.is_whole, line in lines)
-    values = _read_columns(text, rows, columns, len(axes), 0, separator, "frame")
+    values, _ = _read_columns(text, rows, columns, len(axes), 0, separator, "frame")
     times = _read_times(text, values[:, :n_first], rate)
     facts |= {"events": entries, "first_frame": int(values[0, 0])}
     if rate is not None:
-        facts["times"] = times
+        facts |= {"times": times, "decimals": 17}
     names, values = [name for name, *_ in of], values[:, n_first:]
     if any(len(at) != 3 for _, at, _ in of):
         names = [f"{x}_{decode(axes[j]).lower()}" if at[1:] else x for x, at, _ in of for j in at]
@@ -231,7 +231,7 @@ def read_qtm(path):
         )
     lead, size = fitting[0]
     rows = itertools.chain([row] * bool(row), iter(lambda: text.row(None if lead else b"\n"), b""))
-    values = _read_columns(text, rows, range(size), size, 1 if lead else None, b"\t")
+    values, decimals = _read_columns(text, rows, range(size), size, 1 if lead else None, b"\t")
     for of, stated, what in ((len(values), b"NO_OF_FRAMES", "frame"), (n, number, noun)):
         if stated in header:
             word = b" ".join(header[stated])
@@ -241,7 +241,7 @@ def read_qtm(path):
     facts = as_joints(names, values[:, lead:])
     hide_unseen(facts["positions"])
     if lead:
-        facts["times"] = values[:, 1].copy()
+        facts |= {"times": values[:, 1].copy(), "decimals": decimals}
     return facts | {
         "frame_rate": rate, "units": "mm",
         "kind": "markers" if noun == "marker" else "joints",
@@ -291,14 +291,14 @@ def read_motive(path, *, group=None):
     if group == "joints" and facts.get(b"Coordinate Space", b"").lower() == b"local":
         raise text.error("positions are those in the parent bone; export them as Global.")
     columns = [0, 1, *(j + k for _, j, *_ in members[group] for k in range(3))]
-    values = _read_columns(text, iter(text.row, b""), columns, len(axes), 1)
+    values, decimals = _read_columns(text, iter(text.row, b""), columns, len(axes), 1)
     if stated := facts.get(key := b"Total Exported Frames"):
         text.check_count(len(values), text.count(stated, decode(key)), decode(key))
     known = [name for of in members.values() for name, *_ in of]
     motion = as_joints([name for name, *_ in members[group]], values[:, 2:], known)
     return chosen | motion | {
         "parents": _read_parents(text, members[group], motion["subjects"]),
-        "times": values[:, 1].copy(), "up": "y",
+        "times": values[:, 1].copy(), "decimals": decimals, "up": "y",
         "first_frame": int(values[0, 0]) if math.isfinite(values[0, 0]) else None,
     }  # fmt: skip
 

@@ -45,8 +45,9 @@ class MotionFormat(NamedTuple):
       names, which are unique within a subject;
     - what is known of ``frame_rate`` (frames per second), ``units`` (str or list of str) and ``up``
       ("x", "y", "z", "-x", ...);
-    - for formats with a time in each row ``times`` (seconds, not decreasing); ``frame_rate`` is
-      then the rate that the header states;
+    - for formats with a time in each row ``times`` (seconds, not decreasing) and, if it is known,
+      ``decimals`` (how many they were written with, by default as many as the numbers have);
+      ``frame_rate`` is then the rate that the header states;
     - optionally ``events``, triples of label, context ("" without one) and time in seconds;
     - whatever else goes into ``attrs``, as plain Python types: ``left_out`` is a line about what
       was not read.
@@ -220,8 +221,10 @@ def read_motion(
         start = (first_time_of(motion) or 0.0) if times is None else times[0]
         motion["events"] = describe_events(motion["events"], motion["frame_rate"], start)
     if times is not None:
-        stated = motion["frame_rate"]
-        motion |= describe_times(file.name, times, stated=stated, frame_rate=frame_rate)
+        stated, decimals = motion["frame_rate"], motion.pop("decimals", None)
+        motion |= describe_times(
+            file.name, times, stated=stated, decimals=decimals, frame_rate=frame_rate
+        )
     set_clock(motion, frame_rate)
     name = known.name or file.suffix.lower().removeprefix(".")
     df = as_recording(motion, name, file.stem, ["recording", FRAME])
@@ -479,7 +482,9 @@ def check_frame_rate(frame_rate):
         raise ValueError(f"frame_rate must be frames a second, above 0, got {frame_rate!r}.")
 
 
-def describe_times(name, times, *, stated=None, frame_rate=None, unit="s", may_be_thinned=False):
+def describe_times(
+    name, times, *, stated=None, decimals=17, frame_rate=None, unit="s", may_be_thinned=False
+):
     """The ``attrs`` of a recording that describe its times, which do not decrease.
 
     ``frame_rate`` (None if it is not known), ``first_time`` where seconds are known, ``times``
@@ -491,7 +496,7 @@ def describe_times(name, times, *, stated=None, frame_rate=None, unit="s", may_b
     Warns, in the caller's caller, if times are uneven or contradict the stated rate, and no
     ``frame_rate`` is given.
     """
-    rate, even = _estimate_frame_rate(times, stated)
+    rate, even = _estimate_frame_rate(times, decimals, stated)
     facts = {"frame_rate": rate if unit == "s" else None}
     if unit == "s" or frame_rate is not None:
         facts["first_time"] = float(times[0] / (1 if unit == "s" else frame_rate))
@@ -517,7 +522,7 @@ def describe_times(name, times, *, stated=None, frame_rate=None, unit="s", may_b
     return facts
 
 
-def _estimate_frame_rate(times, stated):
+def _estimate_frame_rate(times, decimals, stated):
     """Frames a second of the times, None where it cannot be estimated, and whether they are even.
 
     The stated rate is returned where the times agree with it.
@@ -527,8 +532,10 @@ def _estimate_frame_rate(times, stated):
         return stated, len(times) < 2 or stated is not None
     # Times have few digits: 0.033, 0.067, 0.1.
     rate = float(f"{1 / step:.6g}")
-    decimals = (n for n in range(_DECIMALS) if (np.round(times, n) == times).all())
-    rounding = 10.0 ** -next(decimals, 17)
+    if decimals is None:
+        fitting = (n for n in range(_DECIMALS) if (np.round(times, n) == times).all())
+        decimals = next(fitting, 17)
+    rounding = 10.0**-decimals
     # A lost frame makes the mean step longer, and not the median.
     steps = np.diff(times)
     has_gap = steps.max() >= _GAP * max(np.median(steps), rounding)

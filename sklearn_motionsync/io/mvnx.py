@@ -19,7 +19,7 @@ def read_mvnx(path, *, group="segments"):
     if group not in _GROUPS:
         raise ValueError(f"{path}: there are no {group[:40]} in it; group= reads {[*_GROUPS]}.")
     file = _File(path)
-    values = read_timed_rows(file, file.rows(group), time_column=0)
+    values, decimals = read_timed_rows(file, file.rows(group), time_column=0)
     others = "joint angles" if group == "segments" else "positions of segments"
     poses = "".join(f", the calibration pose {kind!r}" for kind in dict.fromkeys(file.poses))
     facts = {
@@ -31,7 +31,7 @@ def read_mvnx(path, *, group="segments"):
     }
     if file.has_times:
         # They are in milliseconds.
-        facts["times"] = values[:, 0] / 1000
+        facts |= {"times": values[:, 0] / 1000, "decimals": decimals + 3}
     values = values[:, 1:].copy()
     if group == "angles":
         channels = [f"{joint}_{axis}" for joint in file.joints for axis in "xyz"]

@@ -285,12 +285,12 @@ def split_rows(text, rows, n, separator=None):
 
 
 def read_timed_rows(text, rows, time_column, what="time"):
-    """Rows of numbers, NaN where one is missing.
+    """Rows of numbers, NaN where one is missing, and how many decimals the times have.
 
     `rows` yields the fields of one row after the other, as they are read from `text`. The column
     may have the number of the frame in place of its time, or None has neither.
     """
-    result, before = [], -math.inf
+    result, decimals, before = [], 0, -math.inf
     for fields in rows:
         numbers = numbers_or_nan(text, fields)
         time = 0.0 if time_column is None else numbers[time_column]
@@ -300,10 +300,11 @@ def read_timed_rows(text, rows, time_column, what="time"):
                 f"got {time:g} after {before:g}."
             )
         before = time
+        decimals = max(decimals, _count_decimals(fields[time_column or 0]))
         result.append(numbers)
     if not result:
         raise text.error("the file ends where frames should follow; it is not complete.")
-    return np.frombuffer(bytearray().join(result)).reshape(len(result), -1)
+    return np.frombuffer(bytearray().join(result)).reshape(len(result), -1), decimals
 
 
 def read_rate(word):
@@ -334,6 +335,11 @@ def _number_or_nan(text, field):
             f"a frame needs numbers, or nothing where one is missing, got {quote([field])}."
         )
     return float(field)
+
+
+def _count_decimals(field):
+    """Digits behind the point of a number as it is written."""
+    return len(field.strip().partition(b".")[2]) if b"e" not in field.lower() else 17
 
 
 def hide_unseen(positions):
@@ -476,7 +482,7 @@ def read_storage(path):
     labels = _read_labels(text)
     components = _COMPONENTS.get(header.get(b"datatype"), "")
     rows = _split_rows(text, len(labels), len(components))
-    values = read_timed_rows(text, rows, time_column=0)
+    values, decimals = read_timed_rows(text, rows, time_column=0)
     for key, name in ((b"nrows", "nRows"), (b"datarows", "datarows")):
         if key in header:
             text.check_count(len(values), text.count(header[key], name), name)
@@ -486,6 +492,7 @@ def read_storage(path):
         "channels": make_unique(columns),
         "values": values[:, 1:].copy(),
         "times": values[:, 0].copy(),
+        "decimals": decimals,
         "frame_rate": read_rate(header.get(b"datarate", b"")),
         "units": None if forces else _ANGLE_UNITS.get(header.get(b"indegrees")),
         "kind": "forces" if forces else "coordinates",

@@ -32,13 +32,14 @@ def read_trc(path):
     names, row = _read_names(text, header)
     n = 2 + 3 * len(names)
     rows = itertools.chain([row] * bool(row), iter(text.row, b""))
-    values = read_timed_rows(text, split_rows(text, rows, n), time_column=1)
+    values, decimals = read_timed_rows(text, split_rows(text, rows, n), time_column=1)
     text.check_count(len(values), header["numframes"], "NumFrames")
     text.check_count(len(names), header["nummarkers"], "NumMarkers", "marker")
     motion = as_joints(names, values[:, 2:])
     hide_unseen(motion["positions"])
     return motion | {
         "times": values[:, 1].copy(),
+        "decimals": decimals,
         "frame_rate": header["datarate"],
         "units": header["units"],
         "kind": "markers",

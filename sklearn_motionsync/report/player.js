@@ -209,7 +209,7 @@ function play(set) {
   function run(on) {
     if (on === (before !== null)) return;
     if (on && share >= 1) share = 0;
-    before = on ? trial.now() : null;
+    before = on ? performance.now() : null;
     button.textContent = on ? "Pause" : "Play";
     if (on) requestAnimationFrame(step);
   }

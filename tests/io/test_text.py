@@ -211,10 +211,22 @@ def test_fields_between_tabs_may_be_blank(row, n, fields):
     assert split_fields(row, n) == fields
 
 
-def test_numbers_that_are_missing_are_nan(tmp_path):
-    times = ["-1.5", "-1.25 ", "0.1", "1e0", "1E0"]
-    rows = [[b"nan", b"-N/A", b"", time.encode(), b"7"] for time in times]
-    numbers = read_timed_rows(opened(tmp_path, ""), rows, 3)
+@pytest.mark.parametrize(
+    ("times", "decimals"),
+    [
+        (["0", "1"], 0),
+        (["0.", "1.5"], 1),
+        (["0.25 ", "1.5"], 2),
+        (["0", "1.000", "2"], 3),
+        (["0.1", "1e0"], 17),
+        (["0.1", "1E0"], 17),
+        (["-1.5", "-1.25", "-1.25"], 2),
+    ],
+)
+def test_times_have_so_many_decimals(tmp_path, times, decimals):
+    rows = [[b"x", b"nan", b"-N/A", b"", time.encode(), b"7"][1:] for time in times]
+    numbers, found = read_timed_rows(opened(tmp_path, ""), rows, 3)
+    assert found == decimals
     for row, time in zip(numbers, times, strict=True):
         np.testing.assert_array_equal(row, [np.nan, np.nan, np.nan, float(time), 7])
 
@@ -226,7 +238,11 @@ def test_times_that_are_none_or_decrease_are_refused(tmp_path, times):
     with pytest.raises(ValueError, match="the time of a row must be a number, and"):
         read_timed_rows(opened(tmp_path, ""), [[time.encode()] for time in times], 0)
     good = [[b"-9e11"], [b"9e11"], [b"9e11"]]
-    assert read_timed_rows(opened(tmp_path, ""), good, 0).tolist() == [[-9e11], [9e11], [9e11]]
+    assert [row[0] for row in read_timed_rows(opened(tmp_path, ""), good, 0)[0]] == [
+        -9e11,
+        9e11,
+        9e11,
+    ]
     with pytest.raises(ValueError, match="the file ends where frames should follow"):
         read_timed_rows(opened(tmp_path, ""), [], 0)
 

@@ -151,6 +151,7 @@ def test_a_detector_takes_a_reference_as_it_was_recorded():
 # -- exercises of people ------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore::sklearn_motionsync.TrialWarning")
 def test_exercises_of_people_done_right_and_wrong(benchmark, real_data):
     """A person held out; shoulder rotation, where people differ more than right from wrong."""
     read = benchmark("exercises").read_exercises(real_data)

@@ -223,7 +223,8 @@ def players(tmp_path_factory):
     found = {}
     bunch = make_bending(5, n_frames=40, random_state=0)
     pipe = make_pipeline(DirectionCosines(bunch.skeleton), DenseSynchronizer(31)).fit(bunch.data)
-    keyframes = pd.DataFrame({"down": [[10, 12, 9, None, 11]][0], "up": [30] * 5})
+    # In seconds, as there is a frame rate.
+    keyframes = pd.DataFrame({"down": [0.5, 0.6, 0.45, None, 0.55], "up": [1.5] * 5})
     given = {"match": pipe, "keyframes": keyframes, "frame_rate": 20}
     found["aligned"] = visit(write_player(path, bunch.data, bunch.skeleton, **given), folder)
     names = [f"joint{k}_{axis}" for k in range(15) for axis in "xy"]

@@ -110,6 +110,8 @@ def test_the_page_is_one_file_that_needs_nothing(tmp_path):
         assert "default-src 'none'" in policy[0]
         assert "prefers-color-scheme: dark" in page.page
         assert "<nav" not in page.page
+        # The only clock of a browser that is asked in this way.
+        assert set(re.findall(r"(\w+)\.now\(\)", page.page)) == {"performance"}
 
 
 def test_without_a_frame_rate_or_a_match(tmp_path):
