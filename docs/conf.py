@@ -78,7 +78,7 @@ def _classes():
                 yield f"{module.__name__}.{name}", getattr(module, name)
 
 
-# The patterns of _templates/autosummary take the methods of a class from here.
+# The templates of _templates/autosummary take the methods of a class from here.
 autosummary_context = {"class_members": {name: members(cls) for name, cls in _classes()}}
 
 # -- examples and figures -----------------------------------------------------------------

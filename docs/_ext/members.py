@@ -9,7 +9,7 @@ _LABELLED = re.compile(r":ref:`([^`<]*?)\s*<[^`>]*>`")
 
 
 def members(cls):
-    """What the page of a class lists, as plain data for its pattern."""
+    """What the page of a class lists, as plain data for its template."""
     own, properties, inherited = [], [], []
     names = [name for name in dir(cls) if not name.startswith("_") or name == "__call__"]
     for name in names:

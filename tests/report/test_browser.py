@@ -61,7 +61,7 @@ async function visit(width) {
   there.querySelectorAll("button[data-file]").forEach((button) => button.click());
 
   // Without a screen a browser draws when it likes.
-  own.requestAnimationFrame = (f) => own.setTimeout(() => f(own.trial.now()), 16);
+  own.requestAnimationFrame = (f) => own.setTimeout(() => f(own.performance.now()), 16);
   if (find("stage")) {
     const canvases = () => [...find("stage").querySelectorAll("canvas")];
     const picture = () => canvases().map((one) => one.toDataURL()).join();
