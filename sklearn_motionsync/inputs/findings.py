@@ -17,6 +17,8 @@ from .wording import counted, within
 
 __all__ = ["TrialWarning", "check_trials", "mend_trials", "warn_of_findings"]
 
+# The limits below were chosen on faults put into recordings of people and into made ones, so that
+# these are told and the recordings themselves have no finding (docs/howto/exports.md).
 # Limits of angles that are written within one turn, and the period.
 _TURNS = [(-180.0, 180.0, "degrees"), (0.0, 360.0, "degrees")]
 _TURNS += [(-np.pi, np.pi, "radians"), (0.0, 2 * np.pi, "radians")]
