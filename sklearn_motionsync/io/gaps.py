@@ -182,30 +182,31 @@ def warn_of_gaps(df, name):
     if not np.isnan(df.to_numpy()).any():
         return
     kind = df.attrs.get("kind", "joints")
+    what = "positions" if kind in POSITIONS else "values"
     if "channels" in df.attrs:
-        n_missing, n_columns, what = df.isna().sum(), df.shape[1], "values"
-        n_missing = n_missing[n_missing > 0]
+        missing, labels = df.isna().to_numpy(), list(df.columns)
         advice = ". Interpolate short gaps with df.interpolate(limit=<frames>, limit_area='inside')"
     else:
-        gaps, n_columns = find_gaps(df), len(joint_columns(df).joints)
-        n_missing = gaps.groupby("joint")["n_frames"].sum()
-        what = "positions" if kind in POSITIONS else "values"
-        n_outside = int((~gaps["inside"]).sum())
+        columns = joint_columns(df)
+        missing = _missing(df.to_numpy()[:, columns.places.ravel()], columns)
+        labels, (_, first, last) = columns.joints, _find(missing)
+        n_outside = int(((first == 0) | (last == len(df) - 1)).sum())
         ends = f"; {n_outside} touch an end, where ends='trim' leaves frames out" * bool(n_outside)
         advice = (
-            f": {counted(len(gaps), 'gap')}, the longest of "
-            f"{counted(gaps['n_frames'].max(), 'frame')}{ends}. Interpolate short gaps with "
-            "read_motion(..., max_gap=<frames>), list them with find_gaps(df)"
+            f": {counted(len(first), 'gap')}, the longest of "
+            f"{counted((last - first).max(initial=0) + 1, 'frame')}{ends}. Interpolate short gaps "
+            "with read_motion(..., max_gap=<frames>), list them with find_gaps(df)"
         )
-    worst = n_missing.sort_values(ascending=False, kind="stable")
-    names = ", ".join(str(column)[:40] for column in worst.index[:4])
-    names += ", ..." if len(worst) > 4 else ""
-    share = 100 * worst.sum() / (len(df) * n_columns)
+    n_missing = dict(sorted(zip(labels, missing.sum(axis=0).tolist(), strict=True)))
+    worst = sorted(filter(n_missing.get, n_missing), key=n_missing.get, reverse=True)
+    names = ", ".join(str(label)[:40] for label in worst[:4]) + ", ..." * (len(worst) > 4)
+    share = 100 * missing.mean()
     digits = 2 if share < 99 else 3
-    warn(
-        f"{name}: {share:.{digits}g} % of the {what} are missing (NaN), of {len(worst)} of "
-        f"{n_columns} {kind} ({names}){advice}, or drop those columns."
-    )
+    if worst:
+        warn(
+            f"{name}: {share:.{digits}g} % of the {what} are missing (NaN), of {len(worst)} of "
+            f"{len(labels)} {kind} ({names}){advice}, or drop those columns."
+        )
 
 
 def _read(df):

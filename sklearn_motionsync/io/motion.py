@@ -198,44 +198,26 @@ def read_motion(
     check_filling(max_gap, ends)
     check_frame_rate(frame_rate)
     check_confidence(min_confidence, quality)
-    options: dict[str, Any] = {"asf": asf, "group": group}
     files, known = _files_of(path, columns)
+    of_reader: dict[str, Any] = {"asf": asf, "group": group}
+    of_table: dict[str, Any] = {
+        "max_gap": max_gap, "ends": ends, "min_confidence": min_confidence, "quality": quality
+    }  # fmt: skip
     if known is None:
-        options |= {
-            "frame_rate": frame_rate, "max_gap": max_gap, "ends": ends, "subject": subject,
-            "min_confidence": min_confidence, "quality": quality, "verbose": verbose,
-        }  # fmt: skip
-        return _read_several(files, columns, options)
+        options = {"frame_rate": frame_rate, "subject": subject, "verbose": verbose}
+        return _read_several(files, columns, of_reader | of_table | options)
     (file,) = files
-    motion: dict[str, Any] = {"frame_rate": None, "units": None, "up": None}
-    motion |= _read_file(file, known, options)
-    if "joints" in motion:
-        motion.setdefault("parents", [-1] * len(motion["joints"]))
+    motion = _read_file(file, known, of_reader)
     _hide_damage(motion, file)
     choose_subject(motion, subject, file)
-    confidence = motion.pop("confidence", None)
-    if min_confidence is not None and confidence is not None:
-        motion["positions"][confidence < min_confidence] = np.nan
-    times = motion.pop("times", None)
-    if "events" in motion:
-        start = (first_time_of(motion) or 0.0) if times is None else times[0]
-        motion["events"] = describe_events(motion["events"], motion["frame_rate"], start)
-    if times is not None:
-        stated, decimals = motion["frame_rate"], motion.pop("decimals", None)
-        motion |= describe_times(
-            file.name, times, stated=stated, decimals=decimals, frame_rate=frame_rate
-        )
-    set_clock(motion, frame_rate)
+    set_clock(motion, file.name, frame_rate)
     name = known.name or file.suffix.lower().removeprefix(".")
-    df = as_recording(motion, name, file.stem, ["recording", FRAME])
-    if max_gap or ends != "keep":
-        df = fill_gaps(df, max_gap, ends=ends)
+    df = as_recording(motion, name, file.stem, ["recording", FRAME], **of_table)
     df.attrs["report"] = _report(df)
     if verbose:
         print(f"{file.name}: {df.attrs['report']}")
     warn_of_gaps(df, file.name)
-    is_wanted = quality == "keep" and confidence is not None
-    return _with_confidence(df, confidence) if is_wanted else df
+    return df
 
 
 def _files_of(path, columns):
@@ -255,9 +237,21 @@ def _files_of(path, columns):
     return files, known
 
 
-def set_clock(motion, frame_rate):
-    """The time of the first frame; at a new frame rate events are at other times too."""
-    if frame_rate is not None:
+def set_clock(motion, name, frame_rate, **options):
+    """The frame rate, the time of the first frame, uneven times, and events on this clock.
+
+    Options are those of `describe_times`. At a new frame rate events are at other times too.
+    """
+    times, decimals = motion.pop("times", None), motion.pop("decimals", None)
+    if "events" in motion:
+        start = (first_time_of(motion) or 0.0) if times is None else times[0]
+        motion["events"] = describe_events(motion["events"], motion["frame_rate"], start)
+    if times is not None:
+        stated = motion["frame_rate"]
+        motion |= describe_times(
+            name, times, stated=stated, decimals=decimals, frame_rate=frame_rate, **options
+        )
+    elif frame_rate is not None:
         motion["frame_rate"] = float(frame_rate)
     if (rate := motion["frame_rate"]) is None:
         return
@@ -289,7 +283,7 @@ def _format_of(path):
     if known is None:
         raise ValueError(
             f"{path} ends with {path.suffix!r}, which no reader is for, and does not begin like a "
-            f"format that is known by its content; the known endings are {_join(ENDINGS)}."
+            f"format that is known by its content; the known endings are {', '.join(ENDINGS)}."
         )
     return known
 
@@ -302,10 +296,10 @@ def _read_file(path, known, options):
         if known not in takers:
             endings = dict.fromkeys(ending for each in takers for ending in each.endings)
             raise ValueError(
-                f"{name}= goes with {_join(list(endings))} files only, got {name}={value!r} with "
+                f"{name}= goes with {', '.join(endings)} files only, got {name}={value!r} with "
                 f"{path}."
             )
-    return known.read(path, **options)
+    return {"frame_rate": None, "units": None, "up": None} | known.read(path, **options)
 
 
 def choose_subject(motion, subject, path):
@@ -351,9 +345,10 @@ def _hide_damage(motion, path):
     kind, joints = motion["kind"], motion.get("joints")
     values = motion["values"] if joints is None else motion["positions"]
     limit = FARTHEST if kind in (*POSITIONS, "angles") else LARGEST
-    damaged = np.abs(values) > limit
-    if not damaged.any():
+    highest, lowest = (f.reduce(values, axis=None, initial=0) for f in (np.fmax, np.fmin))
+    if max(highest, -lowest) <= limit:
         return
+    damaged = np.abs(values) > limit
     frame, column, *axis = np.argwhere(damaged)[0].tolist()
     name = motion["channels"][column] if joints is None else f"{joints[column]}_{'xyz'[axis[0]]}"
     found = f"frame {frame} of {name[:60]!r} is {values[frame, column, *axis]:.3g}"
@@ -415,35 +410,30 @@ def _keep_common(recordings):
     return result
 
 
-def _join(endings):
-    *before, last = endings
-    return f"{', '.join(before)} and {last}" if before else last
+def as_recording(
+    motion, name, trial, levels, *, max_gap=0, ends="keep", min_confidence=None, quality="drop"
+):
+    """The table of what a reader of the format of this name returned.
 
-
-def as_recording(motion, name, trial, levels):
-    """The table of what a reader of the format of this name returned."""
+    The options are those of `read_motion`.
+    """
     if "positions" in motion:
-        values = motion.pop("positions")
-        columns = [
-            f"{joint}_{axis}" for joint in motion["joints"] for axis in "xyz"[: values.shape[2]]
-        ]
+        values, joints = motion.pop("positions"), motion["joints"]
+        columns = [f"{joint}_{axis}" for joint in joints for axis in "xyz"[: values.shape[2]]]
+        motion.setdefault("parents", [-1] * len(joints))
+        confidence = motion.pop("confidence", None)
+        if confidence is not None and min_confidence is not None:
+            values[confidence < min_confidence] = np.nan
         values = values.reshape(len(values), -1)
+        if quality == "keep" and confidence is not None:
+            columns += [f"{joint}_confidence" for joint in joints]
+            values = np.hstack([values, confidence])
     else:
         values, columns = motion.pop("values"), motion["channels"]
     index = pd.RangeIndex(len(values), name=FRAME)
     df = pd.DataFrame(values, columns=columns, index=index, copy=False)
     df.attrs = {"format": name} | motion | {"trial": trial, "levels": levels}
-    return df
-
-
-def _with_confidence(df, confidence):
-    """A recording with the confidence of its joints in columns behind the positions."""
-    columns = [f"{joint}_confidence" for joint in df.attrs["joints"]]
-    # The ends of a recording may have been left out.
-    of_joints = pd.DataFrame(confidence, columns=columns).reindex(df.index)
-    joined = pd.concat([df, of_joints], axis=1)
-    joined.attrs = df.attrs
-    return joined
+    return fill_gaps(df, max_gap, ends=ends) if max_gap or ends != "keep" else df
 
 
 def _report(df):

@@ -8,8 +8,8 @@ import pandas as pd
 
 from ..inputs.resampling import times_as_numbers
 from ..inputs.tables import FRAME, label_of_part
-from .gaps import fill_gaps
-from .motion import as_recording, check_confidence, check_frame_rate, describe_times, set_clock
+from .gaps import check_filling
+from .motion import as_recording, check_confidence, check_frame_rate, set_clock
 from .text import make_unique, read_rate
 
 _DIMENSIONS = ("time", "individual", "keypoint", "space")
@@ -91,6 +91,7 @@ def from_poses(
     """
     check_frame_rate(frame_rate)
     check_confidence(min_confidence)
+    check_filling(max_gap, "keep")
     position, confidence, attrs = _split_poses(poses)
     position, values = _arrange(position, "position", _DIMENSIONS)
     axes = _read_axes(position)
@@ -103,7 +104,7 @@ def from_poses(
                 "'confidence', and there is none."
             )
         _, confidence = _arrange(confidence, "confidence", _DIMENSIONS[:3])
-        values[np.broadcast_to(confidence < min_confidence, values.shape[:3])] = np.nan
+        confidence = np.broadcast_to(confidence, values.shape[:3])
     joints = make_unique(_read_names(position, "keypoint"))
     times, unit, fps = _read_times(position, attrs)
     motion = {
@@ -112,20 +113,19 @@ def from_poses(
         "up": "-y" if len(axes) == 2 else None,
         "kind": "keypoints",
         "joints": joints,
-        "parents": [-1] * len(joints),
+        "times": times,
+        "decimals": 17,
     }
-    if times is not None:
-        motion |= describe_times(
-            "The poses", times, stated=fps, frame_rate=frame_rate, unit=unit, may_be_thinned=True
-        )
-    set_clock(motion, frame_rate)
-    recordings = []
+    set_clock(motion, "The poses", frame_rate, unit=unit, may_be_thinned=True)
+    recordings, options = [], {"max_gap": max_gap, "min_confidence": min_confidence}
     for i, individual in enumerate(_read_names(position, "individual")):
         motion["positions"] = values[:, i]
-        df = as_recording(motion, "poses", individual, ("individual", FRAME))
+        if min_confidence is not None:
+            motion["confidence"] = confidence[:, i]
+        df = as_recording(motion, "poses", individual, ("individual", FRAME), **options)
         if trial is not None:
             df.attrs |= label_of_part(trial, individual, "individual")
-        recordings.append(df if max_gap == 0 else fill_gaps(df, max_gap))
+        recordings.append(df)
     return recordings
 
 
