@@ -4,16 +4,6 @@ import numpy as np
 
 from .limbs import LIMBS, nearest_ancestor, unit_vectors
 
-__all__ = [
-    "UP_AXES",
-    "convert_to_parent_axes",
-    "fill_heading",
-    "from_y_up",
-    "heading_axes",
-    "project_on_axes",
-    "to_y_up",
-]
-
 # -- the vertical axis --------------------------------------------------------------------
 
 # For each vertical axis in space, the axis of the recording that becomes x, y and z, and its sign:

@@ -39,8 +39,6 @@ from .limbs import (
 )
 from .upright import check_upright
 
-__all__ = ["Body", "PositionsTransformer", "mask_hidden"]
-
 # Frames whose points are computed at a time: they stay in the cache.
 PORTION = 4096
 

@@ -22,8 +22,6 @@ from .limbs import (
 from .skeleton import loose_joints
 from .sphere import mean_direction, mean_length, mean_vector
 
-__all__ = ["blend_bodies", "blend_numbers"]
-
 # A shorter link, in sizes of the body, has no direction.
 _LEAST_LENGTH = 1e-6
 # A link whose length changes by a smaller share is rigid.

@@ -9,8 +9,6 @@ from ..inputs.tables import as_pandas
 from ..inputs.wording import counted
 from .formats import AXES
 
-__all__ = ["check_columns", "columns_of_skeleton", "joint_columns", "plain_positions"]
-
 
 def joint_columns(df):
     """The columns of the joints of a DataFrame of positions, as `parse_columns` gives them.

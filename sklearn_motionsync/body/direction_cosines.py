@@ -26,8 +26,6 @@ from .limbs import (
 )
 from .skeleton import Skeleton
 
-__all__ = ["DirectionCosines"]
-
 # Largest shift of the hips from the pelvis, in leg lengths, that puts a body on the floor. Of 144
 # trials of optical motion capture, and of their approximations in an aSpace, none needs more
 # than 0.21.

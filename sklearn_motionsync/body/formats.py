@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-__all__ = ["AXES", "FORMATS", "LANDMARKS", "SIDES", "Format"]
-
 # Axes of a position in the plane and in space.
 AXES = {2: "xy", 3: "xyz"}
 SIDES = ("left", "right")

@@ -13,8 +13,6 @@ from .direction_cosines import DirectionCosines
 from .formats import LANDMARKS
 from .limbs import landmark_positions
 
-__all__ = ["JointNoise"]
-
 # Draws of every pose, and their seed.
 _DRAWS, _SEED = 20, 0
 

@@ -12,8 +12,6 @@ from .base import PositionsTransformer
 from .formats import AXES, LANDMARKS, SIDES
 from .skeleton import Skeleton
 
-__all__ = ["JointPositions"]
-
 
 class JointPositions(PositionsTransformer):
     """Positions of the joints of a body relative to its pelvis: 42 features.

@@ -10,17 +10,6 @@ from collections import defaultdict
 from .formats import FORMATS, LANDMARKS, SIDES
 from .limbs import limbs_between
 
-__all__ = [
-    "MIDPOINTS",
-    "add_midpoints",
-    "as_tuple",
-    "guess_feet",
-    "guess_landmarks",
-    "missing_counterparts",
-    "nearest_names",
-    "other_side",
-]
-
 # Names of the joint at each landmark, without the side and in small letters, the likeliest first.
 # A new marker set needs a word here:
 #   a|b   the first one that is there;

@@ -6,29 +6,6 @@ import numpy as np
 
 from .formats import AXES, LANDMARKS, SIDES
 
-__all__ = [
-    "LATERAL_LIMBS",
-    "LIMBS",
-    "LIMB_NAMES",
-    "PARTS",
-    "body_size",
-    "complete_legs",
-    "features_of_parts",
-    "landmark_positions",
-    "limb_indices",
-    "limb_vectors",
-    "limbs_between",
-    "lowest_height",
-    "median_lengths",
-    "names_of_cosines",
-    "nearest_ancestor",
-    "part_of_limb",
-    "parts_of_names",
-    "parts_of_poses",
-    "scale_missing_lengths",
-    "unit_vectors",
-]
-
 
 class Limb(NamedTuple):
     """A limb of the body model: its two joints, its parent limb, and its direction at rest.

@@ -19,8 +19,6 @@ from .landmarks import as_tuple, other_side
 from .limbs import LATERAL_LIMBS, LIMBS, unit_vectors
 from .skeleton import Skeleton
 
-__all__ = ["exchange_of_sides", "mirror"]
-
 # A joint without a counterpart is on one side if it is never nearer to the median plane than this,
 # in widths of the hips or the shoulders.
 _OFF_CENTRE = 0.25

@@ -26,8 +26,6 @@ from .landmarks import (
 from .limbs import LIMBS, complete_legs, features_of_parts, landmark_positions, limbs_between
 from .upright import estimate_up
 
-__all__ = ["Skeleton", "find_cycle", "loose_joints"]
-
 # A root that moves less than this share of the largest coordinate stands still, and the length of a
 # bone that changes less does not.
 _STILL = 1e-4

@@ -5,8 +5,6 @@ import numpy as np
 from ..matching.counting import first_largest
 from .limbs import unit_vectors
 
-__all__ = ["exp_map", "log_map", "mean_direction", "mean_length", "mean_vector"]
-
 # Iterations of a mean: directions of a right angle need 40, nearly equal ones 3.
 _MAX_ITER = 100
 _TOLERANCE = 1e-14

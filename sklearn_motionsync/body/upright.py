@@ -6,8 +6,6 @@ from .axes import from_y_up
 from .formats import LANDMARKS, SIDES
 from .limbs import LIMB_NAMES, body_size, landmark_positions, median_lengths, unit_vectors
 
-__all__ = ["check_upright", "estimate_up"]
-
 # A body is upside down if it is so in this share of its frames, by this share of its leg length. Of
 # 363 real trials that bend, hop, crouch and sit down, the closest one has its pelvis
 # 0.26 legs above the ankles and its head, on average, 0.15 above the pelvis.

@@ -49,18 +49,6 @@ from .tables import (
 )
 from .wording import counted, within
 
-__all__ = [
-    "ACCEPTED",
-    "NOT_ONE",
-    "Trials",
-    "as_collection",
-    "as_source",
-    "check_members",
-    "count_of",
-    "gives_rows",
-    "select",
-]
-
 ACCEPTED = (
     "A set of trials is a list of 2-D arrays (n_frames, n_features), a 3-D array "
     "(n_sequences, n_frames, n_features) or a DataFrame indexed by (trial, frame)"

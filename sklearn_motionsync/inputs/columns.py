@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["CONFIDENCE", "JointColumns", "find_clock", "parse_columns"]
-
 # Names of columns that tell how sure a position is, the best ones first.
 CONFIDENCE = [
     *("likelihood", "confidence", "conf", "score", "visibility", "visible", "vis", "probability"),

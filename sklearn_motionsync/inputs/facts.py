@@ -11,15 +11,6 @@ import pandas as pd
 from .recorded import SAME_RATE, frame_rate_of_rows
 from .wording import within
 
-__all__ = [
-    "TIMELESS",
-    "check_facts",
-    "compare_facts",
-    "facts_in_fit",
-    "facts_of",
-    "units_of_columns",
-]
-
 # Attribute of estimators: the different values of each fact in the training set.
 _FACTS = "_facts_in"
 # The facts that matter where the times of frames are given.

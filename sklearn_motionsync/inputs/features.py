@@ -5,8 +5,6 @@ from numbers import Integral
 import pandas as pd
 from sklearn.base import OneToOneFeatureMixin
 
-__all__ = ["as_features", "check_input_features", "choose_features", "names_of_features"]
-
 # Features shown when none are named.
 _FEW = 4
 

@@ -15,8 +15,6 @@ from .numbers import listed
 from .types import TrialsLike
 from .wording import counted, within
 
-__all__ = ["TrialWarning", "check_trials", "mend_trials", "warn_of_findings"]
-
 # The limits below were chosen on faults put into recordings of people and into made ones, so that
 # these are told and the recordings themselves have no finding (docs/howto/exports.md).
 # Limits of angles that are written within one turn, and the period.

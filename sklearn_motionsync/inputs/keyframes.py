@@ -10,8 +10,6 @@ from .recorded import refuse_seconds
 from .resampling import as_frame_rates
 from .wording import counted
 
-__all__ = ["Keyframes"]
-
 
 class Keyframes:
     """The key-frames of a set of trials.

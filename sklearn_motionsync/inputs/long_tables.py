@@ -48,8 +48,6 @@ from .tables import (
 from .types import Labels, Table, TrialsLike
 from .wording import counted
 
-__all__ = ["TrialList", "to_frame", "to_trials"]
-
 # What to do with times that are no frames.
 _EVENTS = (
     "Rows that are events, such as spikes, become rates first: see the page 'Align neural trials' "

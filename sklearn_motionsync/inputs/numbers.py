@@ -10,22 +10,6 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-__all__ = [
-    "FLOATS",
-    "LARGEST",
-    "SMALLEST",
-    "as_numbers",
-    "check_finite",
-    "check_magnitude",
-    "check_names",
-    "column_names",
-    "difference",
-    "is_integer",
-    "listed",
-    "nanmean",
-    "refuse_non_numeric",
-]
-
 # The precisions that are kept.
 FLOATS = np.dtype(np.float64), np.dtype(np.float32)
 # Limits of the largest magnitude of a set of trials. In any unit of motion capture data lie

@@ -16,25 +16,6 @@ from ..matching.counting import whole
 from .resampling import is_even, is_rate, rounded_rate, times_as_numbers
 from .tables import FRAME, split_table
 
-__all__ = [
-    "CLOCK",
-    "SAME_RATE",
-    "Recorded",
-    "first_time_of",
-    "frame_rate_of_rows",
-    "frames_of_rows",
-    "is_thinned",
-    "names_seconds",
-    "recorded_frames",
-    "refuse_moved_events",
-    "refuse_seconds",
-    "rows_at",
-    "set_clock_of_index",
-    "timeless",
-    "times_of_rows",
-    "warn_of_rows",
-]
-
 # Key of ``attrs``: the time of frame 0 and the step to the next, where the index is a time.
 CLOCK = "clock"
 # Keys of ``attrs`` that are true of the rows of one table only.

@@ -11,17 +11,6 @@ from ..matching.sizes import RATES
 from .numbers import as_numbers
 from .wording import counted
 
-__all__ = [
-    "as_frame_rates",
-    "even_grid",
-    "find_time_gaps",
-    "interpolate",
-    "is_even",
-    "is_rate",
-    "rounded_rate",
-    "times_as_numbers",
-]
-
 # Steps of time longer than so many median steps are gaps.
 _GAP = 1.9
 # Times this share of a step from even ones are even.

@@ -14,30 +14,6 @@ from pandas.api.types import is_hashable
 
 from .wording import counted
 
-__all__ = [
-    "FRAME",
-    "INDEX_NAMES",
-    "ROW",
-    "SPLIT",
-    "as_pandas",
-    "as_table",
-    "check_dimensions",
-    "full_names",
-    "index_of",
-    "is_labelled_array",
-    "is_nested",
-    "label_of_part",
-    "labelled",
-    "labels_given",
-    "labels_of",
-    "name_trial",
-    "own_label",
-    "rows_of_labels",
-    "split_nested",
-    "split_table",
-    "stack_frame",
-]
-
 # Names of the levels of an index; the last is that of the frames.
 INDEX_NAMES = TRIAL, FRAME = "trial", "frame"
 # The level of the frames where "frame" names trials.

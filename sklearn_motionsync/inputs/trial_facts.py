@@ -15,8 +15,6 @@ from .resampling import as_frame_rates
 from .tables import INDEX_NAMES, index_of, labels_given, labels_of, name_trial
 from .wording import counted, within
 
-__all__ = ["TrialFacts"]
-
 
 class TrialFacts(NamedTuple):
     """The lengths of trials, their frame rates, and what they are called.

@@ -11,25 +11,6 @@ from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 import numpy as np
 import pandas as pd
 
-__all__ = [
-    "Cost",
-    "Features",
-    "Indexed",
-    "Labels",
-    "NamesLike",
-    "NumbersLike",
-    "Path",
-    "RandomState",
-    "SupportsArray",
-    "Table",
-    "Transformed",
-    "TrialLike",
-    "TrialsLike",
-    "Unit",
-    "UpAxis",
-    "ValuesLike",
-]
-
 _Item = TypeVar("_Item", covariant=True)
 
 

@@ -29,17 +29,6 @@ from .tables import FRAME, SPLIT, TRIAL, as_pandas, stack_frame
 from .types import Transformed, TrialsLike
 from .wording import counted
 
-__all__ = [
-    "SequenceLevelMixin",
-    "TrialTransformerMixin",
-    "check_input",
-    "check_transformed",
-    "names_of_input",
-    "read_collection",
-    "read_source",
-    "restore",
-]
-
 # Attribute of estimators: ``feature_names_in_``, but of any type.
 _NAMES = "_names_in"
 # A straight line over so many frames is no accident.

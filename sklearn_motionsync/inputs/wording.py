@@ -1,7 +1,5 @@
 """Words of messages and reprs."""
 
-__all__ = ["counted", "within"]
-
 
 def counted(n, noun):
     """A number and its noun: "1 frame", "2 frames"."""

@@ -33,13 +33,6 @@ from ..inputs.types import Table, TrialsLike, ValuesLike
 from ..matching.counting import whole
 from .text import warn
 
-__all__ = [
-    "cut_at_events",
-    "is_table_of_events",
-    "keyframes_from_events",
-    "name_recording",
-]
-
 _HELP = (
     "attrs['events'] must be a list of dicts with label, context and frame, as read_motion returns "
     "it for C3D files"

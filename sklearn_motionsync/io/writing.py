@@ -25,14 +25,6 @@ from ..matching.counting import whole
 from ..utils.files import check_path, write_whole
 from .motion import check_frame_rate, read_motion
 
-__all__ = [
-    "Rig",
-    "add_middles",
-    "make_rig",
-    "solve_rig",
-    "write_motion",
-]
-
 _ENDINGS = (".bvh", ".trc", ".mot", ".sto")
 # Digits behind the point, of positions, degrees and seconds.
 _DIGITS = 6
