@@ -58,8 +58,9 @@ def write_motion(
         Which columns are which joints, for arrays. By default a table tells.
     like : str, path-like or DataFrame, default=None
         BVH only: a file, or a table read from one, whose rig is taken: its joints, offsets at rest,
-        channels and their order. X must have its joints, but for end sites. By default that of
-        ``X.attrs``, as `read_motion` leaves it; without one, the first frame is at rest.
+        channels and their order. Joints that turn about one or two axes turn about all three. X
+        must have its joints, but for end sites. By default that of ``X.attrs``, as `read_motion`
+        leaves it; without one, the first frame is at rest.
     frame_rate : float, default=None
         Frames a second; by default what the table tells.
     in_place : bool, default=False
@@ -170,7 +171,13 @@ def _rig_like(like, X, path):
         raise ValueError(f"{path}: like= has no rig: give a BVH file, or a table read from one.")
     if rig is None or (like is None and attrs["joints"] != parse_columns(X.columns).joints):
         return None
-    return Rig(attrs["joints"], attrs["parents"], rig["offsets"], rig["channels"])
+    # A joint that turns turns about all axes: its children need not lie where a hinge leads.
+    turns = [f"{axis}rotation" for axis in "ZXY"]
+    channels = [
+        [*names, *(turn for turn in turns if turn not in names)] if {*turns} & {*names} else names
+        for names in rig["channels"]
+    ]
+    return Rig(attrs["joints"], attrs["parents"], rig["offsets"], channels)
 
 
 def _write_bvh(joints, parents, points, up, rate, rig, path):
@@ -290,8 +297,6 @@ def _printable(names, path):
 # Bones of a body whose median lengths differ from those of the rig by more than this share are as
 # long as in the body.
 _SAME_LENGTH = 1e-3
-# Steps of a joint with one or two axes, and degrees by which its slopes are found.
-_STEPS, _STEP = 12, 1e-4
 # Shorter than this share of the longest bone, an offset has no direction.
 _NO_LENGTH = 1e-6
 
@@ -403,13 +408,7 @@ def solve_rig(rig, points):
             at_rest = np.array([place for _, place in held])
             ways = points[:, [k for k, _ in held]] - placed[:, j, np.newaxis]
             ways = np.einsum("tba,tkb->tka", above, ways)
-            if len(order) == 3:
-                turn = _rotation(at_rest, ways)
-                if len(held) == 1:
-                    turn = _reach_hinge(rig, offsets, points, held[0], placed[:, j], above, turn)
-                angles = _angles(order, turn)
-            else:
-                angles = _few_angles(order, at_rest, ways)
+            angles = _angles(order, _rotation(at_rest, ways))
         axes[j] = above @ _turn(order, angles)
         values = {f"{axis}rotation": angle for axis, angle in zip(order, angles.T, strict=True)}
         values |= dict(zip(("Xposition", "Yposition", "Zposition"), moved.T, strict=True))
@@ -431,37 +430,6 @@ def _held_by(rig, offsets, j):
                 if not rig.turns(k):
                     stack.append((k, place))
     return held
-
-
-def _reach_hinge(rig, offsets, points, held, start, above, turn):
-    """The turn of a joint, twisted about its bone so that a hinge at the end reaches its child.
-
-    A hinge keeps the angle between its axis and its child, which leaves two twists.
-    """
-    k, at_rest = held
-    below = _held_by(rig, offsets, k)
-    if len(rig.turns(k)) != 1 or not below or np.isnan(points[:, below[0][0]]).any():
-        return turn
-    child, at = below[0]
-    hinge = np.eye(3)["XYZ".index(rig.turns(k))]
-    bone = turn @ (at_rest / np.linalg.norm(at_rest))
-    knee = start + np.einsum("tab,tb->ta", above, turn @ at_rest)
-    way = np.einsum("tba,tb->ta", above, points[:, child] - knee)
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    axis = turn @ hinge
-    along = np.einsum("ta,ta->t", axis, bone)[:, np.newaxis] * bone
-    across, normal = axis - along, np.cross(bone, axis)
-    # cos(twist) a + sin(twist) b = c
-    a, b = np.einsum("ta,ta->t", across, way), np.einsum("ta,ta->t", normal, way)
-    c = hinge @ at / np.linalg.norm(at) - np.einsum("ta,ta->t", along, way)
-    middle, half = (
-        np.arctan2(b, a),
-        np.arccos(np.clip(c / np.maximum(np.hypot(a, b), 1e-300), -1, 1)),
-    )
-    twists = np.stack([middle - half, middle + half])
-    twists = np.arctan2(np.sin(twists), np.cos(twists))
-    twist = np.where(np.abs(twists[0]) < np.abs(twists[1]), twists[0], twists[1])
-    return Rotation.from_rotvec(bone * twist[:, np.newaxis]).as_matrix() @ turn
 
 
 def _fit_lengths(rig, points):
@@ -510,27 +478,6 @@ def _angles(order, turn):
         warnings.simplefilter("ignore", UserWarning)
         angles = Rotation.from_matrix(turn).as_euler(order)
     return np.degrees(np.unwrap(angles, axis=0))
-
-
-def _few_angles(order, at_rest, ways):
-    """Degrees about one or two axes that bring vectors to others, by steps of Gauss and Newton.
-
-    They begin at the best of some angles.
-    """
-    tries = np.stack(np.meshgrid(*[np.arange(0, 360, 30.0)] * len(order)), axis=-1)
-    tries = tries.reshape(-1, len(order))
-    turned = np.einsum("nab,kb->nka", _turn(order, tries), at_rest)
-    angles = tries[np.einsum("tka,nka->tn", ways, turned).argmax(axis=1)]
-    for _ in range(_STEPS):
-        moved = _turn(order, angles) @ at_rest.T
-        slopes = [
-            (_turn(order, angles + step) @ at_rest.T - moved).reshape(len(ways), -1) / _STEP
-            for step in _STEP * np.eye(len(order))
-        ]
-        residuals = (ways.transpose(0, 2, 1) - moved).reshape(len(ways), -1)
-        slopes = np.stack(slopes, axis=2)
-        angles = angles + np.einsum("tpm,tm->tp", np.linalg.pinv(slopes), residuals)
-    return np.degrees(np.unwrap(np.radians(angles), axis=0))
 
 
 def _turn(order, angles):
