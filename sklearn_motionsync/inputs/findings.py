@@ -46,20 +46,11 @@ _CLOCK_FRAMES = 8
 # The share of the spread of joints that is along the vertical axis of a body that stands.
 _TALL = 0.48
 # Exchanges of the axes of joints.
-_EXCHANGES = {
-    "xzy": (0, 2, 1),
-    "yxz": (1, 0, 2),
-    "zyx": (2, 1, 0),
-    "yzx": (1, 2, 0),
-    "zxy": (2, 0, 1),
-}
+_EXCHANGES = "xzy", "yxz", "zyx", "yzx", "zxy"
 # Numbers that a fit looks at together.
 _PORTION = 2**17
 # Frames of a trial that tell its size and its axes.
 _SAMPLED = 16
-# Kinds that a fit warns of: each changes what is learnt.
-_WARNED: tuple[str, ...] = ("wrapping", "quaternion", "quality", "fill value", "clock")
-_WARNED += ("zeros at the end", "factor", "exchanged axes")
 _MEND = {
     "wrapping": "np.unwrap(x, period={period:.6g}, axis=0), or mend_trials(X, ['wrapping'])",
     "quaternion": "mend_trials(X, ['quaternion']), or angles in place of quaternions",
@@ -89,6 +80,17 @@ _WHY = {
     "factor": "the trial is in another unit",
     "exchanged axes": "the trial has other axes",
     "other rate": "frames of the trial are of another duration",
+}
+# How a fit says the kinds that change what is learnt, of which it warns.
+_WARNED = {
+    "wrapping": "angles jump by {value:.5g}, a turn of {value:.3g} {unit}",
+    "quaternion": "the sign of a quaternion changes",
+    "quality": "values from 0 to 1 that are named or placed like a confidence",
+    "fill value": "exactly {value:g}, far from the values around it",
+    "clock": "increases evenly in every trial",
+    "zeros at the end": "all features are zero from frame {first} on",
+    "factor": "about {value:g} times as large or as small as the other trials ({between})",
+    "exchanged axes": "its axes fit the other trials in the order {order}",
 }
 
 
@@ -121,6 +123,10 @@ class Finding(NamedTuple):
     value: float
     n_trials: int = 1
     facts: dict = {}
+
+    def fill(self, text):
+        """A text of the table with what it says of this finding."""
+        return text.format(first=self.first, stop=self.last + 1, value=self.value, **self.facts)
 
 
 def check_trials(X: TrialsLike) -> pd.DataFrame:
@@ -176,10 +182,9 @@ def check_trials(X: TrialsLike) -> pd.DataFrame:
     trials, names = _read(X)
     rows = []
     for each in _look(trials, names):
-        facts = {"first": each.first, "stop": each.last + 1, "value": each.value} | each.facts
         label = trials.labels[each.trial] if trials.labels else each.trial
         feature = each.feature if each.feature is None or names is None else names[each.feature]
-        why, mend = _WHY[each.kind], _MEND[each.kind].format(**facts)
+        why, mend = _WHY[each.kind], each.fill(_MEND[each.kind])
         rows.append(
             (each.kind, label, each.n_trials, feature, each.first, each.last, each.value, why, mend)
         )
@@ -256,12 +261,11 @@ def warn_of_findings(trials, names, *, clocks=True):
                 trial = each.trial + int(start) if each.feature is None else None
                 findings.setdefault((each.kind, each.feature, trial), (start, each))
     findings = [each._replace(trial=each.trial + int(start)) for start, each in findings.values()]
-    by_kind = {kind: [x for x in findings if x.kind == kind] for kind in _WARNED}
-    for kind, alike in by_kind.items():
+    for kind in _WARNED:
+        alike = [x for x in findings if x.kind == kind]
         if not alike:
             continue
         first = alike[0]
-        facts = {"first": first.first, "stop": first.last + 1, "value": first.value} | first.facts
         if first.feature is None:
             what = trials.called(first.trial)
             more = f", and {counted(len(alike) - 1, 'other trial')}" if len(alike) > 1 else ""
@@ -271,24 +275,11 @@ def warn_of_findings(trials, names, *, clocks=True):
             where = within(trials.called(first.trial))
             more = "" if kind in ("quality", "clock") else f" in {where}, frame {first.first}"
         warnings.warn(
-            f"{what}{more}: {_SAID[kind].format(**facts)}; {_WHY[kind]}. "
-            f"{_MEND[kind].format(**facts)}. check_trials(X) lists all.",
+            f"{what}{more}: {first.fill(_WARNED[kind])}; {_WHY[kind]}. "
+            f"{first.fill(_MEND[kind])}. check_trials(X) lists all.",
             TrialWarning,
             stacklevel=2,
         )
-
-
-# How a warning says each kind.
-_SAID = {
-    "wrapping": "angles jump by {value:.5g}, a turn of {value:.3g} {unit}",
-    "quaternion": "the sign of a quaternion changes",
-    "quality": "values from 0 to 1 that are named or placed like a confidence",
-    "fill value": "exactly {value:g}, far from the values around it",
-    "clock": "increases evenly in every trial",
-    "zeros at the end": "all features are zero from frame {first} on",
-    "factor": "about {value:g} times as large or as small as the other trials ({between})",
-    "exchanged axes": "its axes fit the other trials in the order {order}",
-}
 
 
 def _read(X):
@@ -340,19 +331,19 @@ def _look(trials, names, cheap=False):
     findings = [*_wrapping(numbers), *_quaternions(numbers), *_quality(numbers, names)]
     findings += [*_fill_values(numbers), *_clocks(numbers)]
     if not cheap:
-        constant = np.flatnonzero(numbers.low == numbers.high)
-        last = len(trials[0]) - 1
-        findings += [Finding("constant", 0, int(k), 0, last, np.nan, len(trials)) for k in constant]
+        findings += _throughout("constant", numbers, numbers.low == numbers.high)
     findings += [*_ends(numbers, cheap), *_factors(numbers)]
-    if not cheap or _are_axes(names):
+    ends = [] if names is None else [str(name)[-1:].lower() for name in names[:3]]
+    # A fit looks where the first columns are the axes of a joint.
+    if not cheap or ends == ["x", "y", "z"]:
         findings += _exchanged(numbers)
     return findings if cheap else findings + [*_other_rates(numbers)]
 
 
-def _are_axes(names):
-    """Whether the first columns are the axes of a joint, by the ends of their names."""
-    ends = [] if names is None else [str(name)[-1:].lower() for name in names[:3]]
-    return ends == ["x", "y", "z"]
+def _throughout(kind, numbers, is_one):
+    """Findings of the features that are one in all frames of all trials."""
+    last, n = len(numbers.trials[0]) - 1, len(numbers.trials)
+    return [Finding(kind, 0, int(k), 0, last, np.nan, n) for k in np.flatnonzero(is_one)]
 
 
 def _of_feature(kind, numbers, k, rows, value, facts=None):
@@ -418,21 +409,16 @@ def _quality(numbers, names):
     inside = (numbers.low >= 0) & (numbers.high <= 1)
     if names is not None:
         words = [str(name[-1] if isinstance(name, tuple) else name).lower() for name in names]
-        named = [word.endswith(_QUALITY) for word in words]
-        columns = np.flatnonzero(named & inside)
-    else:
-        is_third = np.arange(width) % 3 == 2
-        shaped = (
-            width % 3 == 0
-            and width > 3
-            and inside[is_third].all()
-            and (numbers.high[~is_third] > 2).all()
-        )
-        moves = (numbers.low < numbers.high)[is_third].all()
-        columns = np.flatnonzero(is_third) if shaped and moves else []
-    last, n = len(numbers.trials[0]) - 1, len(numbers.trials)
-    for k in columns:
-        yield Finding("quality", 0, int(k), 0, last, np.nan, n)
+        return _throughout("quality", numbers, inside & [word.endswith(_QUALITY) for word in words])
+    is_third = np.arange(width) % 3 == 2
+    shaped = (
+        width % 3 == 0
+        and width > 3
+        and inside[is_third].all()
+        and (numbers.high[~is_third] > 2).all()
+    )
+    moves = (numbers.low < numbers.high)[is_third].all()
+    return _throughout("quality", numbers, is_third & shaped & moves)
 
 
 def _fill_values(numbers):
@@ -471,7 +457,7 @@ def _clocks(numbers):
     """Features, one of several, that only count the time."""
     width = numbers.values.shape[1]
     if width == 1 or numbers.lengths.min() < _CLOCK_FRAMES:
-        return
+        return []
     clocks = np.ones(width, dtype=bool)
     for x in numbers.trials:
         step = (x[-1] - x[0]) / (len(x) - 1)
@@ -479,10 +465,8 @@ def _clocks(numbers):
         # On a straight line, within half a step: times are rounded.
         clocks &= (np.diff(x, axis=0) > 0).all(axis=0) & (np.abs(x - line) <= step / 2).all(axis=0)
         if not clocks.any():
-            return
-    last, n = len(numbers.trials[0]) - 1, len(numbers.trials)
-    for k in np.flatnonzero(clocks):
-        yield Finding("clock", 0, int(k), 0, last, np.nan, n)
+            break
+    return _throughout("clock", numbers, clocks)
 
 
 def _ends(numbers, cheap):
@@ -579,9 +563,9 @@ def _exchanged(numbers):
         if not turned and away[i] <= 4 * typical:
             continue
         fits = {
-            order: np.linalg.norm(means[i][:, axes] - usual)
-            for order, axes in _EXCHANGES.items()
-            if not turned or axes[up] == tallest[i]
+            order: np.linalg.norm(means[i][:, ["xyz".index(axis) for axis in order]] - usual)
+            for order in _EXCHANGES
+            if not turned or order[up] == "xyz"[tallest[i]]
         }
         order = min(fits, key=fits.get)
         if turned or (fits[order] < 0.3 * away[i] and fits[order] < 3 * typical):
