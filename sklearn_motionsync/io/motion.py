@@ -18,8 +18,7 @@ from ..inputs.resampling import is_even, is_rate
 from ..inputs.tables import FRAME
 from ..inputs.types import Path
 from ..inputs.wording import counted
-from .acclaim import read_acclaim
-from .bvh import read_bvh
+from .bones import read_acclaim, read_bvh
 from .c3d import read_c3d
 from .gaps import POSITIONS, check_filling, fill_gaps, warn_of_gaps
 from .keypoints import KEYPOINT_FORMATS

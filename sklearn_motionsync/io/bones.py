@@ -1,4 +1,4 @@
-"""Acclaim: an ASF file with the skeleton, and AMC files with its motion."""
+"""BVH and Acclaim: trees of joints that turn in their parents, and where that puts them."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -6,8 +6,147 @@ from pathlib import Path
 import numpy as np
 
 from ..inputs.wording import counted
-from .kinematics import place_joints, rotate, split_channels, turn
-from .text import MotionText, decode, quote
+from .text import MotionText, decode, make_unique, quote
+
+# -- BVH: a tree of joints with offsets and channels, then the channels of every frame ------------
+
+_KEYWORDS = (b"HIERARCHY", b"ROOT", b"JOINT", b"END", b"OFFSET", b"CHANNELS", b"MOTION", b"{", b"}")
+_CHANNELS = [axis + kind for kind in (b"POSITION", b"ROTATION") for axis in (b"X", b"Y", b"Z")]
+
+
+def read_bvh(path):
+    """A BVH file as a reader of `motion.FORMATS` returns it.
+
+    A position channel takes the place of the component of OFFSET that it names, at every
+    joint; a component without a channel stays at OFFSET.
+    """
+    text = MotionText(path)
+    joints = _read_hierarchy(text)
+    n_channels = sum(len(joint.channels or ()) for joint in joints)
+    if not n_channels:
+        raise text.error("no joint has CHANNELS, so nothing moves.")
+    values, n_stated, frame_rate = _read_motion(text, n_channels)
+    text.check_count(len(values), n_stated, "Frames:")
+    text.check_size(len(values), len(joints))
+    parents = [joint.parent for joint in joints]
+    offsets = np.array([joint.offset for joint in joints]).T[:, :, None]
+    channels = [
+        [f"{name[:1].decode()}{name[1:].decode().lower()}" for name in joint.channels or ()]
+        for joint in joints
+    ]
+    (axes, moved, columns), turns = split_channels(
+        [[("t" if name.endswith("position") else "r", name[0]) for name in of] for of in channels]
+    )
+
+    def translations(values):
+        result = np.repeat(offsets, len(values), axis=2)
+        result[axes, moved] = values[:, columns].T
+        return result
+
+    return {
+        "joints": make_unique([joint.name for joint in joints]),
+        "parents": parents,
+        "positions": place_joints(parents, turns, values, translations),
+        "frame_rate": frame_rate,
+        "up": "y",
+        "kind": "joints",
+        "rig": {"offsets": offsets[:, :, 0].T.tolist(), "channels": channels},
+    }
+
+
+@dataclass
+class _Joint:
+    name: str
+    parent: int
+    is_end: bool = False
+    offset: object = None
+    channels: list | None = None
+
+
+def _read_hierarchy(text):
+    """The joints, parents first, up to and with the word MOTION."""
+    joints, stack = [], []
+    expected = "ROOT, JOINT, End Site, OFFSET, CHANNELS, a brace or MOTION"
+    while (key := (word := text.word(expected)).upper()) != b"MOTION":
+        current = joints[stack[-1]] if stack else None
+        if key in (b"ROOT", b"JOINT", b"END"):
+            joints.append(_read_declaration(text, key, joints, stack))
+            stack.append(len(joints) - 1)
+        elif key == b"}" and stack:
+            if current.offset is None:
+                raise text.error(f"joint {current.name[:60]!r} ends without an OFFSET.")
+            stack.pop()
+        elif key == b"OFFSET" and stack and current.offset is None:
+            words = [text.word("a number of OFFSET") for _ in range(3)]
+            current.offset = text.numbers(words, 3, "OFFSET")
+        elif key == b"CHANNELS" and stack and current.channels is None:
+            current.channels = _read_channels(text, current.is_end)
+        elif key != b"HIERARCHY" or joints:
+            raise text.error(f"expected {expected}, got {quote([word])}.")
+    if stack or not joints:
+        raise text.error(
+            f"MOTION begins with {counted(len(stack), 'open joint')} of {len(joints)}; every "
+            "{ needs a }, and at least one ROOT must be there."
+        )
+    return joints
+
+
+def _read_declaration(text, key, joints, stack):
+    """A new joint, up to and with its opening brace; its name may be a key-word, as "root"."""
+    words = []
+    while (word := text.word("{")) != b"{":
+        if word == b"}" or (word.upper() in _KEYWORDS and (words or key == b"END")):
+            raise text.error(f"expected a joint's name and {{, got {quote([word])}.")
+        words.append(word)
+    parent = stack[-1] if stack else -1
+    inside = parent >= 0 and not joints[parent].is_end
+    if (key == b"ROOT") == bool(stack) or (key != b"ROOT" and not inside):
+        raise text.error(
+            f"{quote([key])} stands where it cannot; a ROOT is in no joint, a JOINT or End Site in "
+            "a ROOT or JOINT."
+        )
+    if key == b"END":
+        return _Joint(joints[parent].name + "_end", parent, is_end=True)
+    if not words:
+        raise text.error("expected the joint's name before {.")
+    return _Joint(decode(b" ".join(words)), parent)
+
+
+def _read_channels(text, is_end):
+    number = text.word("the number of CHANNELS")
+    # There are six different channels, so no longer list can be right.
+    if not number.isdigit() or len(number) > 1 or int(number) > len(_CHANNELS):
+        raise text.error(f"CHANNELS needs a number from 0 to 6, got {quote([number])}.")
+    channels = [text.word("the name of a channel").upper() for _ in range(int(number))]
+    if not set(channels) <= set(_CHANNELS) or len(set(channels)) < len(channels):
+        raise text.error(
+            f"CHANNELS {int(number)} needs as many different names of Xposition ... Zrotation, "
+            f"got {quote(channels)}."
+        )
+    if is_end and channels:
+        raise text.error("an End Site has no CHANNELS.")
+    return channels
+
+
+def _read_motion(text, n_channels):
+    """The channels (n_frames, n_channels), the stated number of frames, and frames a second."""
+    n_frames = text.count(_read_field(text, b"frames"), "Frames:")
+    frame_time = text.positive([_read_field(text, b"frame time")], "Frame Time:")
+    values = text.table(n_channels, "a frame (one number a channel)")
+    if not len(values):
+        raise text.error("the file ends where frames should follow; it is not complete.")
+    return values, n_frames, 1 / frame_time
+
+
+def _read_field(text, name):
+    words = text.line()
+    key, colon, value = b" ".join(words).partition(b":")
+    if not colon or b" ".join(key.lower().split()) != name:
+        raise text.error(f"expected '{name.decode().title()}: <number>', got {quote(words)}.")
+    return value.strip()
+
+
+# -- Acclaim: an ASF file with the skeleton, and AMC files with its motion -----------------------
 
 _METRES_PER_INCH = 0.0254
 _DOFS = ("tx", "ty", "tz", "rx", "ry", "rz")
@@ -33,9 +172,6 @@ def read_acclaim(path, *, asf=None):
         "up": "y",
         "kind": "joints",
     }
-
-
-# -- the skeleton: ASF ------------------------------------------------------------------
 
 
 @dataclass
@@ -190,9 +326,6 @@ def _connect(text, bones, parents):
         )
 
 
-# -- the motion: AMC --------------------------------------------------------------------
-
-
 def _read_amc(text, bones, in_degrees, asf):
     """Values (n_frames, n_dofs) in the order of the bones, and what else the file tells."""
     n_dofs = {bone.name: len(bone.dofs) for bone in bones}
@@ -248,9 +381,6 @@ def _read_setting(text, words, header):
         header["frame_rate"] = text.positive(words[1:], ":SAMPLES-PER-SECOND")
 
 
-# -- positions --------------------------------------------------------------------------
-
-
 def _place_bones(bones, in_degrees, values, degrees):
     """Positions of the far ends of the bones, in the unit of the skeleton.
 
@@ -297,3 +427,95 @@ def _own_axes(bones, in_degrees):
         names = bone.axis_order[::-1].upper()
         axes.append(turn(np.eye(3), names, np.radians(angles) if in_degrees else angles))
     return np.stack(axes, axis=2)
+
+
+# -- forward kinematics: positions of joints, from how each moves in its parent ------------------
+
+# Frames, and frames times joints, that are placed at once: enough for the overhead of NumPy's calls
+# not to count, and few enough for the processor's cache and the memory.
+_FRAMES = 2**12
+_BLOCK = 2**18
+# The two axes that turn about a third, the first to where the second was.
+_OTHERS = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}
+
+
+def split_channels(channels):
+    """Columns that move joints, and columns that turn them.
+
+    Of each joint come its channels in the order of their columns: ("t" or "r", axis), with the axis
+    "X", "Y" or "Z". ``moving`` (3, n) has axis, joint and column of each translation, ``turns`` for
+    each joint the axes about which it turns, such as "ZXY", and their columns.
+    """
+    moving, turns, column = [], [], 0
+    for j, joint_channels in enumerate(channels):
+        axes, columns = "", []
+        for kind, axis in joint_channels:
+            if kind == "t":
+                moving.append(("XYZ".index(axis), j, column))
+            else:
+                axes += axis
+                columns.append(column)
+            column += 1
+        turns.append((axes, columns))
+    return np.array(moving, dtype=int).reshape(-1, 3).T, turns
+
+
+def place_joints(parents, turns, values, translations, *, degrees=True, at_rest=None, bones=None):
+    """Positions (n_frames, n_joints, 3) of the joints of a tree, each with axes that turn with it.
+
+    Joints turn by ``values`` (n_frames, n_channels), in ``turns`` as `split_channels` returns them,
+    each axis turned by those before it. ``translations(values)`` returns, for some frames, the
+    translation of each joint along the axes of its parent, (3, n_joints, n_frames), which is
+    overwritten. ``at_rest`` (3, 3, n_joints) are the axes of joints before they turn, as columns,
+    in those of their parents, by default the same; ``bones`` (3, n_joints) lead from where a joint
+    turns to its position, along its axes.
+    """
+    children = {-1: []}
+    for j, parent in enumerate(parents):
+        children.setdefault(parent, []).append(j)
+    order = children[-1]
+    for j in order:
+        order += children.get(j, ())
+    positions = np.empty((len(values), len(parents), 3))
+    step = max(1, min(_FRAMES, _BLOCK // len(parents)))
+    for first in range(0, len(values), step):
+        block = values[first : first + step]
+        angles = np.radians(block.T) if degrees else np.ascontiguousarray(block.T)
+        places, axes_of = translations(block), {-1: np.eye(3)[:, :, None]}
+        for j in order:
+            above = axes_of[parents[j]]
+            places[:, j] = rotate(above, places[:, j])
+            if parents[j] >= 0:
+                places[:, j] += places[:, parents[j]]
+            # The rotation of a leaf moves nothing but its bone.
+            if j in children or bones is not None:
+                axes = np.repeat(above, len(block) // above.shape[2], axis=2)
+                if at_rest is not None:
+                    axes = rotate(axes[:, :, None], at_rest[:, :, j, None])
+                names, columns = turns[j]
+                axes_of[j] = turn(axes, names, angles[columns])
+            if bones is not None:
+                places[:, j] += rotate(axes_of[j], bones[:, j, None])
+        positions[first : first + step] = places.transpose(2, 1, 0)
+    return positions
+
+
+def rotate(axes, vectors):
+    """Vectors (3, ...) given along axes (3, 3, ...), in the coordinates of the axes."""
+    result = axes[:, 0] * vectors[0]
+    result += axes[:, 1] * vectors[1]
+    result += axes[:, 2] * vectors[2]
+    return result
+
+
+def turn(axes, names, angles):
+    """Turn axes (3, 3, ...) about some of themselves, as they are then, by angles (n, ...)."""
+    for name, c, s in zip(names, np.cos(angles), np.sin(angles), strict=True):
+        i, j = _OTHERS[name]
+        first, second = axes[:, i], axes[:, j]
+        across = s * first
+        first *= c
+        first += s * second
+        second *= c
+        second -= across
+    return axes
