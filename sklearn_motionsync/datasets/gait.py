@@ -360,7 +360,15 @@ def _describe_takes(people, frame_rate):
         # Strike and key-frames of one cycle after the other, and the last strike.
         by_cycle = np.column_stack([strikes[:-1], keyframes])
         all_keyframes.append(np.append(by_cycle, strikes[-1]))
-        events.append(_list_events(signals, strikes, keyframes, frame_rate))
+        marked = [("Foot Strike", frame) for frame in strikes]
+        marked += [("Foot Off", frame) for frame in keyframes[:, list(_KEYFRAMES).index("toe-off")]]
+        events.append(
+            [
+                dict(label=label, context="Right", time=float(at / frame_rate), frame=float(at))
+                for label, at in sorted(marked, key=lambda event: event[1])
+                if 0 <= at <= len(signals) - 1
+            ]
+        )
     return Bunch(
         data=data,
         times=times,
@@ -370,17 +378,6 @@ def _describe_takes(people, frame_rate):
         keyframe_times=np.append(moments, n_cycles),
         events=events,
     )
-
-
-def _list_events(data, strikes, keyframes, frame_rate):
-    """The events within a take, by time."""
-    toe_offs = keyframes[:, list(_KEYFRAMES).index("toe-off")]
-    marked = [("Foot Strike", f) for f in strikes] + [("Foot Off", f) for f in toe_offs]
-    return [
-        dict(label=label, context="Right", time=float(at / frame_rate), frame=float(at))
-        for label, at in sorted(marked, key=lambda event: event[1])
-        if 0 <= at <= len(data) - 1
-    ]
 
 
 def gait_csv() -> Path:

@@ -238,7 +238,10 @@ def check_members(
 
 def as_collection(X):
     """The trials of a collection as a list; None for what scikit-learn calls 2-D."""
-    _refuse_containers(X)
+    # What other packages keep trials in, alone or in a list.
+    for kind in set(map(type, X if isinstance(X, (list, tuple)) else [X])):
+        if way := _CONTAINERS.get((kind.__module__.partition(".")[0], kind.__name__)):
+            raise ValueError(f"{ACCEPTED}, got {kind.__name__}. {way}")
     X = as_pandas(X)
     if isinstance(X, pd.DataFrame):
         if is_nested(X):
@@ -273,15 +276,6 @@ _CONTAINERS = {
     "to_trials(X.to_dataframe(dim_order=[..., 'time'])).",
     ("skfda", "FDataGrid"): "Give list(X.data_matrix).",
 }
-
-
-def _refuse_containers(X):
-    """Refuse what other packages keep trials in, alone or in a list."""
-    items = X if isinstance(X, (list, tuple)) else [X]
-    for kind in set(map(type, items)):
-        way = _CONTAINERS.get((kind.__module__.partition(".")[0], kind.__name__))
-        if way:
-            raise ValueError(f"{ACCEPTED}, got {kind.__name__}. {way}")
 
 
 def _members(X):

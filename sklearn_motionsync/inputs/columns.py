@@ -22,6 +22,8 @@ _SPELLINGS = [
     re.compile(rf"(?P<joint>.+?)(?-i:(?=[A-Z])){_TAIL}", re.IGNORECASE),
     re.compile(rf"{_TAIL}(?P<joint>(?-i:[A-Z0-9]).*)", re.IGNORECASE),
 ]
+# Where a word begins in another: "AccelX".
+_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 # Names of vectors that are no positions, and words for those that are.
 _NO_POSITION = re.compile(
     r"(.*[^a-z])?(acc|accel|acceleration|vel|velocity|speed|gyro|mag|rot|rotation|orient|"
@@ -143,15 +145,11 @@ def _gather(splits, any_vector):
         for joint, tails in columns.items()
         if tails.keys() >= {"x", "y"}
         and "w" not in tails
-        and (any_vector or not _is_no_position(joint[1]))
+        and (any_vector or not _NO_POSITION.fullmatch(re.sub(_HUMP, "_", joint[1]).lower()))
     }
     n_in_space = sum("z" in tails for tails in columns.values())
     axes = ("xyz" if 2 * n_in_space >= len(columns) else "xy") if columns else ""
     return axes, {joint: t for joint, t in columns.items() if t.keys() >= set(axes)}
-
-
-def _is_no_position(joint):
-    return _NO_POSITION.fullmatch(re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", joint).lower())
 
 
 def _best(spellings, any_vector):

@@ -55,17 +55,16 @@ def check_facts(estimator, facts, called, *, reset, which=None):
     of its ``_facts``, or all. All else is as for `compare_facts`.
     """
     which = getattr(estimator, "_facts", None) if which is None else which
-    reference = {} if reset else facts_in_fit(estimator)
-    sources = dict.fromkeys(reference, "the training set has")
+    known = {} if reset else facts_in_fit(estimator)
+    reference = {fact: (values, "the training set has") for fact, values in known.items()}
     if (rate := getattr(estimator, "frame_rate", None)) is not None:
-        reference = reference | {"frame_rate": (rate,)}
-        sources["frame_rate"] = "frame_rate is"
-    values = compare_facts(facts, called, which, reference, sources)
+        reference["frame_rate"] = (rate,), "frame_rate is"
+    values = compare_facts(facts, called, which, reference)
     if reset:
         vars(estimator)[_FACTS] = values
 
 
-def compare_facts(facts, called, which=None, reference=None, sources=None):
+def compare_facts(facts, called, which=None, reference=None):
     """The different values of the facts of trials, which must agree but for the frame rate.
 
     Parameters
@@ -76,10 +75,9 @@ def compare_facts(facts, called, which=None, reference=None, sources=None):
         Gives the name of a trial by its index.
     which : sequence of str, default=None
         The facts to compare; by default all.
-    reference : dict of str to tuple, default=None
-        Values known before; the first trial that says something is the reference of others.
-    sources : dict of str to str, default=None
-        Where these are from, for messages.
+    reference : dict of str to (tuple, str), default=None
+        Values known before, and where they are from, for messages; by default the first trial that
+        says something is the reference of others.
 
     Returns
     -------
@@ -96,10 +94,11 @@ def compare_facts(facts, called, which=None, reference=None, sources=None):
     UserWarning
         If frame rates differ by more than 1 %.
     """
-    compared = dict(reference or {})
+    reference = {} if reference is None else reference
+    compared = {fact: values for fact, (values, _) in reference.items()}
     for fact in (_WORDS if which is None else which) if any(facts) else ():
-        values, source = list(compared.get(fact, ())), (sources or {}).get(fact)
-        different = {}
+        values, source = reference.get(fact, ((), ""))
+        values, different = list(values), {}
         for i, value in enumerate([each.get(fact) for each in facts]):
             if value is None or any(_equal(value, other) for other in values):
                 continue

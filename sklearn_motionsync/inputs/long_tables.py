@@ -347,7 +347,9 @@ def _split_by_columns(df, by, time, frame_rate, max_gap_time):
             index = pd.Index(grid, name=time)
             x = pd.DataFrame(columns, index=index).set_axis(x.columns, axis=1)
         attrs = recording.attrs_of(rows, times, grid) | {"resampled": grid is not None}
-        attrs[CLOCK] = _clock(times if grid is None else grid)
+        even = times if grid is None else grid
+        step = (even[-1] - even[0]) / (len(even) - 1) if len(even) > 1 else 1
+        attrs[CLOCK] = float(even[0]), float(step)
         sequences.append(labelled(x, label, (*names, time), attrs))
         set_clock_of_index(sequences[-1])
     return sequences
@@ -445,12 +447,6 @@ def _check_gaps(timed, labels, max_gap_time):
             "evenly spaced: bridge gaps by straight lines with max_gap_time="
             f"{end - start:.7g}, or leave such trials out. {_EVENTS}"
         )
-
-
-def _clock(times):
-    """The first of even times, and their step."""
-    step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1
-    return float(times[0]), float(step)
 
 
 def _rows(features, rows, index):

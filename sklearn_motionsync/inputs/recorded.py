@@ -308,9 +308,19 @@ class Recorded:
             facts["first_time"] = start + (first / rate if first else 0)
         if seconds is not None and frames.max() < len(seconds):
             seconds = np.asarray(seconds)[frames]
-            facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
+            seconds = seconds if grid is None else np.interp(grid, times, seconds)
+            facts["first_time"] = float(seconds[0])
+            if len(seconds) > 1 and is_even(seconds):
+                pace = (len(seconds) - 1) / (seconds[-1] - seconds[0])
+                facts["frame_rate"] = rounded_rate(pace)
+            else:
+                facts["times"] = seconds.tolist()
+        elif is_rate(rate) and grid is not None:
+            pace = np.median(np.diff(times)) / (grid[1] - grid[0])
+            facts["frame_rate"] = rounded_rate(rate / self.step * pace)
         elif is_rate(rate):
-            facts["frame_rate"] = self._rate_of(rate, frames, times, grid)
+            has_steps = times is not None or self._is_whole or (np.diff(frames) == self.step).all()
+            facts["frame_rate"] = rate / self.step if has_steps else None
         if isinstance(events, (list, tuple)) and (np.diff(frames) > 0).all():
             last = len(frames if grid is None else grid) - 1
             moved = [_move_event(event, frames, times, grid) for event in events]
@@ -318,24 +328,6 @@ class Recorded:
                 event for event in moved if all_rows or 0 <= (_frame_of(event) or 0) <= last
             ]
         return facts
-
-    def _rate_of(self, rate, frames, times, grid):
-        """The frame rate of a trial, from that of the recording."""
-        if grid is not None:
-            pace = np.median(np.diff(times)) / (grid[1] - grid[0])
-            return rounded_rate(rate / self.step * pace)
-        if times is None and not self._is_whole and (np.diff(frames) != self.step).any():
-            return None
-        return rate / self.step
-
-
-def _clock_of(seconds):
-    """The frame rate of even times, or the times."""
-    clock = {"first_time": float(seconds[0])}
-    if len(seconds) > 1 and is_even(seconds):
-        rate = (len(seconds) - 1) / (seconds[-1] - seconds[0])
-        return clock | {"frame_rate": rounded_rate(rate)}
-    return clock | {"times": seconds.tolist()}
 
 
 def _frame_of(event):

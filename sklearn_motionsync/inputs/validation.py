@@ -403,7 +403,12 @@ def read_source(estimator, source, on_rows):
     on_rows : bool
         As for `check_trials`.
     """
-    dtype = _dtype_of_maps(source)
+    # The precision of memory maps is known before they are read.
+    kinds = {getattr(x, "dtype", None) for x in source} if isinstance(source, (list, tuple)) else ()
+    kinds = {source.dtype} if isinstance(source, np.memmap) else kinds
+    dtype = None
+    if kinds:
+        dtype = np.dtype(np.float32 if kinds == {np.dtype(np.float32)} else np.float64)
     start, portion, size = 0, [], 0
     for i in range(len(source)):
         portion.append(source[i])
@@ -423,12 +428,3 @@ def read_source(estimator, source, on_rows):
             dtype=dtype,
         )
         start, portion, size = i + 1, [], 0
-
-
-def _dtype_of_maps(source):
-    """The precision of memory maps, known before they are read; None of all else."""
-    kinds = {getattr(x, "dtype", None) for x in source} if isinstance(source, (list, tuple)) else ()
-    kinds = {source.dtype} if isinstance(source, np.memmap) else kinds
-    if not kinds:
-        return None
-    return np.dtype(np.float32 if kinds == {np.dtype(np.float32)} else np.float64)

@@ -25,7 +25,11 @@ def read_bvh(path):
     n_channels = sum(len(joint.channels or ()) for joint in joints)
     if not n_channels:
         raise text.error("no joint has CHANNELS, so nothing moves.")
-    values, n_stated, frame_rate = _read_motion(text, n_channels)
+    n_stated = text.count(_read_field(text, b"frames"), "Frames:")
+    frame_time = text.positive([_read_field(text, b"frame time")], "Frame Time:")
+    values = text.table(n_channels, "a frame (one number a channel)")
+    if not len(values):
+        raise text.error("the file ends where frames should follow; it is not complete.")
     text.check_count(len(values), n_stated, "Frames:")
     text.check_size(len(values), len(joints))
     parents = [joint.parent for joint in joints]
@@ -47,7 +51,7 @@ def read_bvh(path):
         "joints": make_unique([joint.name for joint in joints]),
         "parents": parents,
         "positions": place_joints(parents, turns, values, translations),
-        "frame_rate": frame_rate,
+        "frame_rate": 1 / frame_time,
         "up": "y",
         "kind": "joints",
         "rig": {"offsets": offsets[:, :, 0].T.tolist(), "channels": channels},
@@ -126,16 +130,6 @@ def _read_channels(text, is_end):
     if is_end and channels:
         raise text.error("an End Site has no CHANNELS.")
     return channels
-
-
-def _read_motion(text, n_channels):
-    """The channels (n_frames, n_channels), the stated number of frames, and frames a second."""
-    n_frames = text.count(_read_field(text, b"frames"), "Frames:")
-    frame_time = text.positive([_read_field(text, b"frame time")], "Frame Time:")
-    values = text.table(n_channels, "a frame (one number a channel)")
-    if not len(values):
-        raise text.error("the file ends where frames should follow; it is not complete.")
-    return values, n_frames, 1 / frame_time
 
 
 def _read_field(text, name):
@@ -390,7 +384,12 @@ def _place_bones(bones, in_degrees, values, degrees):
     along the axes of space, from its offset, and the axes of its children are given in the axes
     that it has turned to.
     """
-    bone_axes = _own_axes(bones, in_degrees)
+    bone_axes = []
+    for bone in bones:
+        angles = np.radians(bone.axis) if in_degrees else np.array(bone.axis)
+        # Rotations about fixed axes are those about turning axes in the opposite order.
+        bone_axes.append(turn(np.eye(3), bone.axis_order[::-1].upper(), angles[::-1]))
+    bone_axes = np.stack(bone_axes, axis=2)
     back = bone_axes.swapaxes(0, 1).copy()
     back[:, :, 0] = np.eye(3)
     offsets = np.array([bone.offset for bone in bones]).T
@@ -416,17 +415,6 @@ def _place_bones(bones, in_degrees, values, degrees):
     return place_joints(
         parents, turns, values, translations, degrees=degrees, at_rest=at_rest, bones=far_ends
     )
-
-
-def _own_axes(bones, in_degrees):
-    """C (3, 3, n_bones)."""
-    axes = []
-    for bone in bones:
-        angles = np.array(bone.axis)[::-1]
-        # Rotations about fixed axes are those about turning axes in the opposite order.
-        names = bone.axis_order[::-1].upper()
-        axes.append(turn(np.eye(3), names, np.radians(angles) if in_degrees else angles))
-    return np.stack(axes, axis=2)
 
 
 # -- forward kinematics: positions of joints, from how each moves in its parent ------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import os
 from collections.abc import Callable, Iterable
 from numbers import Real
@@ -24,7 +25,7 @@ from .gaps import POSITIONS, check_filling, fill_gaps, warn_of_gaps
 from .keypoints import KEYPOINT_FORMATS
 from .labs import MOTIVE, QTM, VICON, read_motive, read_qtm, read_vicon
 from .mvnx import read_mvnx
-from .text import FARTHEST, describe_events, make_unique, read_storage, warn
+from .text import FARTHEST, make_unique, read_storage, warn
 from .trc import read_trc
 
 
@@ -244,7 +245,14 @@ def set_clock(motion, name, frame_rate, **options):
     times, decimals = motion.pop("times", None), motion.pop("decimals", None)
     if "events" in motion:
         start = (first_time_of(motion) or 0.0) if times is None else times[0]
-        motion["events"] = describe_events(motion["events"], motion["frame_rate"], start)
+        rate, events = motion["frame_rate"], []
+        for label, context, time in motion["events"]:
+            if math.isfinite(time):
+                # The numbers of a C3D file have 24 bits.
+                time = round(time, 6)
+                frame = None if rate is None else round(float((time - start) * rate), 5)
+                events.append(dict(label=label, context=context or None, time=time, frame=frame))
+        motion["events"] = sorted(events, key=lambda event: event["time"])
     if times is not None:
         stated = motion["frame_rate"]
         motion |= describe_times(

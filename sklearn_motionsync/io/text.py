@@ -300,7 +300,8 @@ def read_timed_rows(text, rows, time_column, what="time"):
                 f"got {time:g} after {before:g}."
             )
         before = time
-        decimals = max(decimals, _count_decimals(fields[time_column or 0]))
+        word = fields[time_column or 0].strip().lower()
+        decimals = max(decimals, 17 if b"e" in word else len(word.partition(b".")[2]))
         result.append(numbers)
     if not result:
         raise text.error("the file ends where frames should follow; it is not complete.")
@@ -324,22 +325,15 @@ def numbers_or_nan(text, fields):
             return numbers
     except ValueError:
         pass
-    return array.array("d", (_number_or_nan(text, field) for field in fields))
-
-
-def _number_or_nan(text, field):
-    if field.strip().lower().lstrip(b"+-") in _MISSING:
-        return math.nan
-    if not _is_number(field, math.inf):
-        raise text.error(
-            f"a frame needs numbers, or nothing where one is missing, got {quote([field])}."
-        )
-    return float(field)
-
-
-def _count_decimals(field):
-    """Digits behind the point of a number as it is written."""
-    return len(field.strip().partition(b".")[2]) if b"e" not in field.lower() else 17
+    numbers = array.array("d")
+    for field in fields:
+        is_missing = field.strip().lower().lstrip(b"+-") in _MISSING
+        if not is_missing and not _is_number(field, math.inf):
+            raise text.error(
+                f"a frame needs numbers, or nothing where one is missing, got {quote([field])}."
+            )
+        numbers.append(math.nan if is_missing else float(field))
+    return numbers
 
 
 def hide_unseen(positions):
@@ -420,28 +414,6 @@ def _common_prefix(names):
     landmarks = guess_landmarks(rest)
     known = {*landmarks.values(), *guess_feet(rest, landmarks).values()}
     return prefix if 2 * len(known) >= len(rest) else ""
-
-
-# -- contents beside the frames -----------------------------------------------------------------
-
-
-def describe_events(entries, rate, start):
-    """Events by time, of (label, context, time); `start` is the time of the first frame.
-
-    The frame of an event is that of the recording, from 0; None where no frame rate is known.
-    """
-    events = [
-        {
-            "label": label,
-            "context": context or None,
-            "time": time,
-            "frame": None if rate is None else round(float((time - start) * rate), 5),
-        }
-        # The numbers of a C3D file have 24 bits.
-        for label, context, time in ((*texts, round(time, 6)) for *texts, time in entries)
-        if math.isfinite(time)
-    ]
-    return sorted(events, key=lambda event: event["time"])
 
 
 def describe_groups(groups, group, others):

@@ -408,7 +408,12 @@ def solve_rig(rig, points):
             at_rest = np.array([place for _, place in held])
             ways = points[:, [k for k, _ in held]] - placed[:, j, np.newaxis]
             ways = np.einsum("tba,tkb->tka", above, ways)
-            angles = _angles(order, _rotation(at_rest, ways))
+            with warnings.catch_warnings():
+                # Where two axes coincide either angle will do.
+                warnings.simplefilter("ignore", UserWarning)
+                angles = Rotation.from_matrix(_rotation(at_rest, ways)).as_euler(order)
+            # Without jumps.
+            angles = np.degrees(np.unwrap(angles, axis=0))
         axes[j] = above @ _turn(order, angles)
         values = {f"{axis}rotation": angle for axis, angle in zip(order, angles.T, strict=True)}
         values |= dict(zip(("Xposition", "Yposition", "Zposition"), moved.T, strict=True))
@@ -455,29 +460,16 @@ def _rotation(rest, ways):
     weights = np.linalg.norm(rest, axis=1)
     # Vectors on one line leave the turn about it open: then the smallest rotation is taken.
     if np.linalg.matrix_rank(unit, tol=1e-4) == 1:
-        return _smallest(unit[weights.argmax()], along[:, weights.argmax()])
+        start, ends = unit[weights.argmax()], along[:, weights.argmax()]
+        axis, real = np.cross(start, ends), 1 + ends @ start
+        # Opposite vectors turn about any normal.
+        axis[real < 1e-12] = np.cross(start, np.eye(3)[np.abs(start).argmin()])
+        return Rotation.from_quat(np.column_stack([axis, real])).as_matrix()
     product = np.einsum("tka,kb->tab", along * weights[:, np.newaxis], unit)
     u, _, vt = np.linalg.svd(product)
     sign = np.sign(np.linalg.det(u @ vt))
     u = u * np.stack([np.ones_like(sign), np.ones_like(sign), sign], axis=1)[:, np.newaxis]
     return u @ vt
-
-
-def _smallest(start, ends):
-    """The smallest rotations (n_frames, 3, 3) from a unit vector to others (n_frames, 3)."""
-    axis, real = np.cross(start, ends), 1 + ends @ start
-    # Opposite vectors turn about any normal.
-    axis[real < 1e-12] = np.cross(start, np.eye(3)[np.abs(start).argmin()])
-    return Rotation.from_quat(np.column_stack([axis, real])).as_matrix()
-
-
-def _angles(order, turn):
-    """Rotations (n_frames, 3, 3) as degrees (n_frames, 3) about three axes, without jumps."""
-    with warnings.catch_warnings():
-        # Where two axes coincide either angle will do.
-        warnings.simplefilter("ignore", UserWarning)
-        angles = Rotation.from_matrix(turn).as_euler(order)
-    return np.degrees(np.unwrap(angles, axis=0))
 
 
 def _turn(order, angles):
