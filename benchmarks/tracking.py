@@ -134,11 +134,11 @@ class Fold:
 
     def place(self, poses, x):
         """Joints (n_frames, n_joints, 3) of poses of a person with limbs of unit directions."""
-        lengths = DirectionCosines(self.skeleton).fit([x]).limb_lengths_
+        matrix, _ = DirectionCosines(self.skeleton).fit([x]).position_matrix()
         limbs = poses[:, 1:].reshape(len(poses), -1, 3)
         limbs = limbs / np.linalg.norm(limbs, axis=2, keepdims=True)
         whole = np.column_stack([poses[:, 0], limbs.reshape(len(limbs), -1)])
-        return (whole @ self.cosines.position_matrix(lengths)[0].T).reshape(len(whole), -1, 3)
+        return (whole @ matrix.T).reshape(len(whole), -1, 3)
 
     def error(self, poses, x, counts):
         """Of joints, in cm."""

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import pandas as pd
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import LARGEST, as_numbers
-from ..inputs.types import Transformed, TrialsLike, ValuesLike
+from ..inputs.numbers import LARGEST
+from ..inputs.types import Transformed, TrialsLike
 from ..inputs.validation import check_transformed, restore
 from ..inputs.wording import counted
 from .axes import convert_to_parent_axes, project_on_axes
@@ -68,7 +67,7 @@ class DirectionCosines(PositionsTransformer):
     ----------
     limb_lengths_ : ndarray, shape (n_limbs,)
         Median length of each of ``skeleton.limbs`` over the frames of ``fit`` that show it, in
-        the unit of the positions. ``inverse_transform`` uses them by default.
+        the unit of the positions. ``inverse_transform`` uses them.
     n_features_in_ : int
         The number of joints times that of their axes.
     feature_names_in_ : ndarray of str
@@ -142,9 +141,7 @@ class DirectionCosines(PositionsTransformer):
         self.reference = reference
         self.hidden = hidden
 
-    def inverse_transform(
-        self, X: TrialsLike, limb_lengths: ValuesLike | None = None
-    ) -> Transformed:
+    def inverse_transform(self, X: TrialsLike) -> Transformed:
         """Joint positions of poses: the paper's fifteen joints.
 
         Of a skeleton that lacks landmarks they are those that its limbs join,
@@ -168,8 +165,6 @@ class DirectionCosines(PositionsTransformer):
         ----------
         X : list of arrays (n_frames_i, 37), 3-D array, or 2-D array
             Poses. Cosines of a limb are scaled to length 1.
-        limb_lengths : array-like of shape (n_limbs,), default=None
-            Length of each limb, above 0; by default ``limb_lengths_``.
 
         Returns
         -------
@@ -180,19 +175,16 @@ class DirectionCosines(PositionsTransformer):
         Raises
         ------
         ValueError
-            If the cosines of a limb are all 0, columns are not those of
-            ``get_feature_names_out``, or ``limb_lengths`` are not numbers above 0, one a limb.
+            If the cosines of a limb are all 0, or columns are not those of
+            ``get_feature_names_out``.
         """
         check_is_fitted(self, "limb_lengths_")
-        lengths = self._as_lengths(limb_lengths)
         names = self.get_feature_names_out()
         trials = check_transformed(self, X, names, finite=self._finite)
-        arrays = [self._positions(trials, i, lengths) for i in range(len(trials))]
+        arrays = [self._positions(trials, i) for i in range(len(trials))]
         return restore(self, trials, arrays, columns=self.skeleton.body().column_names)
 
-    def position_matrix(
-        self, limb_lengths: ValuesLike | None = None
-    ) -> tuple[np.ndarray, list[str]]:
+    def position_matrix(self) -> tuple[np.ndarray, list[str]]:
         """The matrix of the linear map from poses to joint positions.
 
         The pelvis is at its height above the origin, and each joint at the end of its limb. That
@@ -203,11 +195,6 @@ class DirectionCosines(PositionsTransformer):
         The rows of x and y are an orthographic picture from the front. A `MotionTracker` that
         observes positions takes such rows as its projection, and that height of the legs as its
         offset, 0 for other joints.
-
-        Parameters
-        ----------
-        limb_lengths : array-like of shape (n_limbs,), default=None
-            Length of each limb, above 0; by default ``limb_lengths_``.
 
         Returns
         -------
@@ -220,8 +207,7 @@ class DirectionCosines(PositionsTransformer):
         Raises
         ------
         ValueError
-            If ``reference="parent"``, whose axes turn with the pose: that is not linear. Or if
-            ``limb_lengths`` are not numbers above 0, one a limb.
+            If ``reference="parent"``, whose axes turn with the pose: that is not linear.
 
         Examples
         --------
@@ -247,8 +233,8 @@ class DirectionCosines(PositionsTransformer):
                 "Positions are not linear in cosines along parent limbs, which turn with the "
                 "pose. Use reference='heading' or 'world', or inverse_transform."
             )
-        lengths = self._as_lengths(limb_lengths).astype(np.float64)
-        matrix = _forward_matrix(self._all_lengths(lengths), self.skeleton)
+        lengths = self._all_lengths(self.limb_lengths_.astype(np.float64))
+        matrix = _forward_matrix(lengths, self.skeleton)
         return matrix, self.skeleton.body().column_names
 
     @property
@@ -270,28 +256,7 @@ class DirectionCosines(PositionsTransformer):
         heights = (portion.position_of("pelvis")[:, 1] - body.floor) / self._size_of(body)
         return np.column_stack([heights, cosines])
 
-    def _as_lengths(self, limb_lengths):
-        """One length above 0 for each limb; by default those of ``fit``."""
-        if limb_lengths is None:
-            return self.limb_lengths_
-        limbs = self.skeleton.limbs
-        names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else limbs
-        if names not in (limbs, list(range(len(limbs)))):
-            raise ValueError(f"limb_lengths is indexed by {names}; select {limbs}, in that order.")
-        lengths = as_numbers(limb_lengths, "limb_lengths", dtype=np.float64)
-        if lengths.shape != (len(limbs),):
-            raise ValueError(
-                f"limb_lengths needs one length for each of {limbs}, got shape {lengths.shape}."
-            )
-        wrong = ~((lengths > 0) & np.isfinite(lengths))
-        if wrong.any():
-            limb = int(wrong.argmax())
-            raise ValueError(
-                f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {limbs[limb]!r}."
-            )
-        return lengths
-
-    def _positions(self, trials, i, lengths):
+    def _positions(self, trials, i):
         poses, limbs = trials[i], self.skeleton.limbs
         first, n_dims = int(self.skeleton.has_height), self.skeleton.n_dims
         by_limb = poses[:, first:].reshape(len(poses), -1, n_dims)
@@ -312,7 +277,7 @@ class DirectionCosines(PositionsTransformer):
         if self.reference == "parent":
             cosines = convert_to_parent_axes(cosines, limbs, inverse=True)
         heights = poses[:, 0] if first else None
-        lengths = self._all_lengths(lengths).astype(poses.dtype)
+        lengths = self._all_lengths(self.limb_lengths_).astype(poses.dtype)
         positions = _forward_kinematics(heights, cosines, lengths, self.skeleton)
         if self._finite is not True:
             mask_hidden(positions.reshape(len(positions), -1, n_dims))

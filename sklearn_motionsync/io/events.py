@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from numbers import Real
 
 import numpy as np
@@ -49,8 +49,6 @@ def cut_at_events(
     df: pd.DataFrame,
     start: str | tuple[str, str],
     stop: str | tuple[str, str] | None = None,
-    *,
-    trial: Hashable = None,
 ) -> list[pd.DataFrame]:
     """Cut a recording into trials at its events, such as gait cycles at heel strikes.
 
@@ -68,8 +66,6 @@ def cut_at_events(
     stop : str or (str, str), default=None
         Label, or label and context, of the events at which a trial ends. By default it is
         `start`, so that a trial lasts until the next event of the same kind.
-    trial : hashable, default=None
-        Label of the recording; by default ``df.attrs["trial"]``, if there is one.
 
     Returns
     -------
@@ -93,7 +89,7 @@ def cut_at_events(
         first_time, times : float, list of float
             The time of its first frame and the times of all, in seconds, if the recording has them.
         trial, levels : hashable, tuple of str
-            Its label, 0, 1, ... by time, behind the label of the recording if it has one; and the
+            Its label, 0, 1, ... by time, behind ``df.attrs["trial"]`` if there is one; and the
             names of the levels of an index of labels.
 
     Raises
@@ -143,10 +139,9 @@ def cut_at_events(
         rows = recording.rows_between(begin, end)
         if rows is not None:
             cuts.append(_cut(df, recording, rows, other_events))
-    label = df.attrs.get("trial") if trial is None else trial
     for i, cut in enumerate(cuts):
         cut.attrs |= {"trial": i, "levels": ("trial", FRAME)}
-        if label is not None:
+        if (label := df.attrs.get("trial")) is not None:
             cut.attrs |= label_of_part(label, i, "part", df.attrs.get("levels", ()))
     return cuts
 

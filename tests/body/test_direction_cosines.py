@@ -89,15 +89,6 @@ def test_inverse_transform_reconstructs_positions_except_place_and_heading(refer
     np.testing.assert_allclose(again[0], poses[0], atol=1e-9)
 
 
-def test_inverse_transform_uses_given_limb_lengths(recording):
-    cosines = DirectionCosines(Skeleton.paper()).fit(recording)
-    back = cosines.inverse_transform(cosines.transform(recording), 2 * cosines.limb_lengths_)
-    again = DirectionCosines(Skeleton.paper()).fit(back)
-    np.testing.assert_allclose(again.limb_lengths_, 2 * cosines.limb_lengths_)
-    with pytest.raises(ValueError, match="one length for each"):
-        cosines.inverse_transform(cosines.transform(recording), [1.0])
-
-
 # -- inverse_transform --------------------------------------------------------------------
 
 
@@ -145,27 +136,6 @@ def test_inverse_transform_refuses_cosines_of_length_0_and_scales_others(recordi
     np.testing.assert_allclose(
         cosines.inverse_transform(tiny), cosines.inverse_transform(poses), atol=1e-9
     )
-
-
-GOOD = np.ones(12)
-
-
-@pytest.mark.parametrize(
-    ("lengths", "message"),
-    [
-        *((np.where(np.arange(12) == 1, bad, GOOD), "above 0, got .* for 'torso'")
-          for bad in (np.nan, -1.0, 0.0, np.inf)),
-        (["long"] * 12, "limb_lengths is not a numeric array"),
-        ([1.0], "one length for each"),
-        (GOOD[np.newaxis], "one length for each"),
-        (pd.Series(GOOD, index=list("abcdefghijkl")), "limb_lengths is indexed by"),
-    ],
-)  # fmt: skip
-def test_inverse_transform_refuses_wrong_limb_lengths(recording, lengths, message):
-    cosines = DirectionCosines(Skeleton.paper())
-    poses = cosines.fit_transform([recording])
-    with pytest.raises(ValueError, match=message):
-        cosines.inverse_transform(poses, lengths)
 
 
 # -- names of columns ---------------------------------------------------------------------

@@ -100,14 +100,14 @@ def test_labels_follow_those_of_the_recording():
 
     plain = cut_at_events(recording(*WALK), LEFT)
     assert labels(plain) == [(i, ("trial", "frame")) for i in range(2)]
-    named = cut_at_events(recording(*WALK), LEFT, trial="walk")
+    named = cut_at_events(recording(*WALK, trial="walk"), LEFT)
     assert labels(named) == [(("walk", i), ("recording", "part", "frame")) for i in range(2)]
     known = recording(*WALK, trial=("ann", 3), levels=("subject", "trial", "frame"))
     levels = ("subject", "trial", "part", "frame")
     assert labels(cut_at_events(known, LEFT)) == [(("ann", 3, i), levels) for i in range(2)]
     again = cut_at_events(cut_at_events(known, LEFT)[0], OFF)
     assert labels(again) == [(("ann", 3, 0, 0), ("subject", "trial", "part", "part_4", "frame"))]
-    pair = cut_at_events(recording(*WALK), LEFT, trial=("ann", 3))
+    pair = cut_at_events(recording(*WALK, trial=("ann", 3)), LEFT)
     assert pair[0].attrs["levels"] == ("recording_0", "recording_1", "part", "frame")
     assert len(to_frame(named)) == 72 + 71
 
