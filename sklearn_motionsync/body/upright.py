@@ -90,7 +90,11 @@ def check_upright(heights, points, lengths, skeleton, what):
     medians = median_lengths(lengths)
     limbs = [name for name in skeleton.limbs if not np.isnan(medians[LIMB_NAMES.index(name)])]
     margin = _MARGIN * body_size(medians, limbs)
-    if np.quantile(rises, _MOST_FRAMES) >= -margin or not _is_symmetric(medians, limbs):
+    length_of = dict(zip(LIMB_NAMES, medians, strict=True))
+    pairs = [(name, name.replace("left", "right")) for name in limbs if name.startswith("left_")]
+    pairs = [(length_of[left], length_of[right]) for left, right in pairs if right in limbs]
+    is_symmetric = all(max(pair) < _LARGEST_ASYMMETRY * min(pair) for pair in pairs)
+    if np.quantile(rises, _MOST_FRAMES) >= -margin or not is_symmetric:
         return
     lower, middle, upper = _levels(points(), seen)
     bottom, top = (middle, upper) if lower is None else (lower, middle)
@@ -133,17 +137,6 @@ def _seen_rises(lower, upper):
     """Vectors (n_seen, n_dims) from lower to upper points in the frames that show both."""
     rises = upper - lower
     return rises[~np.isnan(rises[:, 1])]
-
-
-def _is_symmetric(lengths, limbs):
-    """Whether the lengths of left and right limbs are about equal."""
-    of = dict(zip(LIMB_NAMES, lengths, strict=True))
-    pairs = [
-        (of[left], of[right])
-        for left in limbs
-        if left.startswith("left_") and (right := left.replace("left", "right")) in limbs
-    ]
-    return all(max(pair) < _LARGEST_ASYMMETRY * min(pair) for pair in pairs)
 
 
 def _nearest_axis(rise):

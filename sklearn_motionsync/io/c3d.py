@@ -61,7 +61,11 @@ def read_c3d(path, *, group=None):
             "frame_rate": None if rate is None else rate * per_frame,
         }
     facts = choose_group(file.path, groups, group, {})
-    first_frame = _read_first_frame(file, parameters)
+    # The first frame usually counts from 1; it may be two words of 16 bits, the lower first.
+    words = parameters.numbers("TRIAL", "ACTUAL_START_FIELD")
+    first_frame = file.integer(6)
+    if words and all(math.isfinite(word) and word >= 0 for word in words):
+        first_frame = int(words[0]) + (65536 * int(words[1]) if len(words) > 1 else 0)
     events = _read_event_parameters(parameters)
     if events is None:
         # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
@@ -460,15 +464,6 @@ def _read_analog(frames, parameters, n):
 
 
 # -- events -----------------------------------------------------------------------------
-
-
-def _read_first_frame(file, parameters):
-    """The number of the first frame in its trial, which usually counts from 1."""
-    start = parameters.numbers("TRIAL", "ACTUAL_START_FIELD")
-    if not start or not all(math.isfinite(word) and word >= 0 for word in start):
-        return file.integer(6)
-    # Two words of 16 bits, the lower first.
-    return int(start[0]) + (65536 * int(start[1]) if len(start) > 1 else 0)
 
 
 def _read_event_parameters(parameters):

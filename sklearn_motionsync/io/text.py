@@ -1,16 +1,12 @@
-"""What the readers of text files share, tables of text, and those of OpenSim, MOT and STO."""
+"""What the readers of text files share, and the tables of OpenSim, MOT and STO."""
 
 import array
-import contextlib
 import inspect
 import io
 import math
 import os
-import re
 import warnings
 from collections import Counter
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -29,7 +25,7 @@ PORTION = 2**22
 _PLAIN = b"0123456789+-.eE \t\n"
 # Before pandas 3.1 the last digit is right only with this option; since then it is deprecated.
 _OLD = tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1)
-_EXACT = {"float_precision": "round_trip"} if _OLD else {}
+EXACT = {"float_precision": "round_trip"} if _OLD else {}
 # What programs write for a missing number, without its sign.
 _MISSING = {b"", b"nan", b"na", b"n/a", b"null", b"none", b"inf", b"infinity"}
 _MISSING |= {b"1.#ind", b"1.#inf", b"1.#qnan", b"1.#snan", b"nan(ind)", b"nan(snan)"}
@@ -204,17 +200,6 @@ def check_result_size(path, file_size, n_bytes, what):
         )
 
 
-@contextlib.contextmanager
-def naming(path, what):
-    """Whatever libraries raise becomes a ValueError that names the file."""
-    try:
-        yield
-    except Exception as error:
-        message = str(error)[:400]
-        message = message if message.startswith(str(path)) else f"{path} {what}. {message[:200]}"
-        raise ValueError(message) from error
-
-
 def _plain_numbers(text, n):
     """Lines of `n` plain finite numbers each, as an array; None if they are anything else."""
     if text.translate(None, _PLAIN):
@@ -233,7 +218,7 @@ def _plain_numbers(text, n):
                 na_filter=False,
                 engine="c",
                 low_memory=False,
-                **_EXACT,
+                **EXACT,
             ).to_numpy()
         except ValueError:
             continue
@@ -511,75 +496,3 @@ def _split_rows(text, n_labels, n_components):
                 f"{quote([row])}."
             )
         yield values
-
-
-# -- tables with a column for each number, and names of the columns ------------------------------
-
-
-class Cells(NamedTuple):
-    """The cells of a table: labels of its columns, and the number of the line of each row."""
-
-    path: Path
-    labels: list
-    table: pd.DataFrame
-    lines: list | None = None
-
-    def numbers(self, place, words=None):
-        """A column as floats, NaN where a cell is blank or infinite; words may stand for some."""
-        cells = self.table[place]
-        if cells.dtype.kind not in "fiu":
-            if words:
-                cells = cells.map(lambda x: words.get(str(x).lower(), x))
-            numbers = pd.to_numeric(cells, errors="coerce")
-            wrong = (numbers.isna() & cells.notna()).to_numpy()
-            if wrong.any():
-                row = int(wrong.argmax())
-                raise ValueError(
-                    f"{self.path}, {f'line {self.lines[row]}' if self.lines else f'row {row}'}: "
-                    f"column {str(self.labels[place])[:60]!r} needs numbers, or nothing where one "
-                    f"is missing, got {str(cells.iloc[row])[:60]!r}."
-                )
-            cells = numbers
-        values = cells.to_numpy(dtype=np.float64, na_value=np.nan)
-        return np.where(np.isfinite(values), values, np.nan)
-
-    def is_text(self, place):
-        return self.table[place].dtype.kind not in "fiub" and self.table[place].notna().any()
-
-
-def split_cells(line):
-    """The cells of a line, and the character between them."""
-    separator = max((b",", b"\t", b";"), key=line.count)
-    return [decode(cell).strip(' "\t') for cell in line.split(separator)], separator
-
-
-def read_cells(path, n_header=1):
-    """The rows of a table of text below the lines of its header."""
-    text = MotionText(path)
-    levels, (*_, separator) = zip(*(split_cells(text.row()) for _ in range(n_header)), strict=True)
-    n = len(levels[-1])
-    if len({len(level) for level in levels}) > 1 or not re.search("[A-Za-z]", "".join(levels[0])):
-        raise text.error("a header needs a name above each column, such as 'hip_x'.")
-    rows, lines = [], []
-    while row := text.row():
-        n_cells = row.count(separator) + 1
-        if b'"' not in row and not row.rstrip(separator).count(separator) < n <= n_cells:
-            raise text.error(
-                f"a row needs {counted(n, 'column')}, as the header has, got {n_cells} "
-                f"({quote([row])}). The file is not complete, or does not begin with names."
-            )
-        rows.append(row)
-        lines.append(text.line_number)
-    if not rows:
-        raise text.error("the file ends where frames should follow; it is not complete.")
-    options = {"sep": separator.decode(), "skipinitialspace": True, "skip_blank_lines": False}
-    options |= {"encoding_errors": "replace", "low_memory": False, "index_col": False} | _EXACT
-    if separator != b"," and re.search(rb"\d,\d", rows[0]):
-        options["decimal"] = ","
-    with naming(path, "holds rows that are no table"):
-        data = io.BytesIO(b"\n".join(rows))
-        table = pd.read_csv(data, header=None, names=range(n), usecols=range(n), **options)
-        if len(table) != len(rows):
-            raise ValueError("A quotation mark has no end.")
-    labels = list(zip(*levels, strict=True)) if n_header > 1 else levels[0]
-    return Cells(path, labels, table, lines)
