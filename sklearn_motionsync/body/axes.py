@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .limbs import LIMBS, nearest_ancestor, unit_vectors
+from .limbs import LIMBS, unit_vectors
 
 # -- the vertical axis --------------------------------------------------------------------
 
@@ -23,7 +23,7 @@ _IN_PLANE = {
     "x": ((1, 1), (0, 1)),
     "-x": ((1, -1), (0, -1)),
 }
-UP_AXES = {2: _IN_PLANE, 3: _IN_SPACE}
+UP_AXES: dict[int, dict] = {2: _IN_PLANE, 3: _IN_SPACE}
 
 
 def to_y_up(points, skeleton):
@@ -128,7 +128,10 @@ def convert_to_parent_axes(cosines, limbs, *, inverse=False):
     for i, (name, limb) in enumerate(LIMBS.items()):
         if name not in limbs:
             continue
-        cosine, parent = cosines[:, i : i + 1], axes_of[nearest_ancestor(name, limbs)]
+        above = limb.parent
+        while above is not None and above not in limbs:
+            above = LIMBS[above].parent
+        cosine, parent = cosines[:, i : i + 1], axes_of[above]
         local = cosine if inverse else project_on_axes(cosine, parent)
         whole = cosine @ parent if inverse else cosine
         out[:, i : i + 1] = whole if inverse else local

@@ -53,8 +53,14 @@ def blend_bodies(arrays, frames, weights, skeleton):
     # Places and links are blended in units of the body.
     links = blend_numbers([x.links / x.size for x in figures], frames, weights)
     links *= size[:, np.newaxis, np.newaxis]
-    limbs = [x.links[:, directed] for x in figures]
-    links[:, directed] = _blend_vectors(limbs, frames, weights)
+    # Vectors are blended in direction and in length.
+    vectors = []
+    for x, f in zip(figures, frames, strict=True):
+        limbs, left = x.links[:, directed], np.minimum(f.astype(np.intp), len(x.links) - 2)
+        share = f - left
+        pair, shares = np.stack([limbs[left], limbs[left + 1]]), np.stack([1 - share, share])
+        vectors.append(mean_vector(pair, shares[..., np.newaxis]))
+    links[:, directed] = mean_vector(np.stack(vectors), weights[..., np.newaxis])
     angle, place = _blend_path(figures, frames, weights, size)
     place[:, 1] = _blend_heights([x.place[:, 1] for x in figures], figures, frames, weights, size)
     foot = _blend_heights([x.foot for x in figures], figures, frames, weights, size)
@@ -69,17 +75,6 @@ def blend_bodies(arrays, frames, weights, skeleton):
         if not any(np.ptp(x, axis=0).any() for x in columns_of_joint):
             blend[:, columns] = blend_numbers(columns_of_joint, frames, weights)
     return blend
-
-
-def _blend_vectors(arrays, frames, weights):
-    """Vectors (n_frames_i, n_links, n_dims) blended in direction and in length."""
-    vectors = []
-    for x, f in zip(arrays, frames, strict=True):
-        left = np.minimum(f.astype(np.intp), len(x) - 2)
-        share = f - left
-        pair, shares = np.stack([x[left], x[left + 1]]), np.stack([1 - share, share])
-        vectors.append(mean_vector(pair, shares[..., np.newaxis]))
-    return mean_vector(np.stack(vectors), weights[..., np.newaxis])
 
 
 def _blend_path(figures, frames, weights, size):

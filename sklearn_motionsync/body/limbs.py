@@ -68,14 +68,6 @@ def limb_indices(limbs):
     return [LIMB_NAMES.index(name) for name in limbs]
 
 
-def nearest_ancestor(name, limbs):
-    """The nearest of the limbs above a limb in the tree of parents, or None."""
-    above = LIMBS[name].parent
-    while above is not None and above not in limbs:
-        above = LIMBS[above].parent
-    return above
-
-
 def complete_legs(limbs):
     """The sides whose thigh and leg are both among the limbs."""
     return [side for side in SIDES if {f"{side}_thigh", f"{side}_leg"} <= set(limbs)]

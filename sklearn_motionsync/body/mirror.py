@@ -81,30 +81,21 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
     parts = list(sequences)
     if not parts:
         raise ValueError("Found 0 trials (n_samples=0); there is nothing to mirror.")
-    arrays = [_as_positions(x, skeleton, i) for i, x in enumerate(parts)]
+    arrays = []
+    for i, x in enumerate(parts):
+        positions = plain_positions(as_pandas(x), skeleton)
+        array = as_numbers(positions, f"Trial {i}")
+        width = array.shape[-1] if array.ndim > 1 else 1
+        check_columns(column_names(positions) or (), skeleton, f"Trial {i}", width)
+        arrays.append(array.reshape(*array.shape[:-1], -1, skeleton.n_dims))
     _check_middle(arrays, skeleton, alone)
-    mirrored = [
-        _as_kind_of(x, _mirror_array(array, skeleton, counterparts), skeleton, counterparts)
-        for x, array in zip(parts, arrays, strict=True)
-    ]
+    mirrored, lateral = [], UP_AXES[skeleton.n_dims][skeleton.up][0][0]
+    for x, array in zip(parts, arrays, strict=True):
+        image = array[..., counterparts, :]
+        image[..., lateral] = -image[..., lateral]
+        image = image.reshape(*array.shape[:-2], -1)
+        mirrored.append(_as_kind_of(x, image, skeleton, counterparts))
     return mirrored[0] if one else mirrored
-
-
-def _as_positions(x, skeleton, i):
-    """Positions (..., n_joints, n_dims) of one trial, or of several in one array."""
-    what = f"Trial {i}"
-    x = plain_positions(as_pandas(x), skeleton)
-    array = as_numbers(x, what)
-    width = array.shape[-1] if array.ndim > 1 else 1
-    check_columns(column_names(x) or (), skeleton, what, width)
-    return array.reshape(*array.shape[:-1], -1, skeleton.n_dims)
-
-
-def _mirror_array(array, skeleton, counterparts):
-    out = array[..., counterparts, :]
-    lateral = UP_AXES[skeleton.n_dims][skeleton.up][0][0]
-    out[..., lateral] = -out[..., lateral]
-    return out.reshape(*array.shape[:-2], -1)
 
 
 def _as_kind_of(x, array, skeleton, counterparts):

@@ -264,7 +264,11 @@ class Skeleton:
         # Renamed columns are not joints of the file.
         names_of_file = names if set(joints) <= set(names) else ()
         guess = guess_landmarks(joints, names_of_file, clusters=not named)
-        positions = _positions_of(df, columns)
+        try:
+            positions = as_numbers(df.iloc[:, columns.places.ravel()], "df", dtype=np.float64)
+            positions = positions.reshape(len(positions), *columns.places.shape)
+        except (TypeError, ValueError):
+            positions = None
         if positions is not None:
             # Of the markers of a static trial, those that were taken off stand for nothing.
             never = np.isnan(positions).any(axis=2).all(axis=0)
@@ -443,15 +447,6 @@ def loose_joints(skeleton):
     held = {joint for name in skeleton.landmarks for joint in skeleton.indices_of(name)}
     held |= {joint for bone in skeleton.bones for joint in bone}
     return [j for j in range(len(skeleton.joints)) if j not in held] if skeleton.bones else []
-
-
-def _positions_of(df, columns):
-    """The positions (n_frames, n_joints, n_dims) of a table; None if they are no numbers."""
-    try:
-        values = as_numbers(df.iloc[:, columns.places.ravel()], "df", dtype=np.float64)
-    except (TypeError, ValueError):
-        return None
-    return values.reshape(len(values), *columns.places.shape)
 
 
 def _without_still_roots(x, joints, parents, held):

@@ -74,7 +74,12 @@ def load_trials(path: Path) -> Bunch:
     texts = {name: _check_texts(path, name, fields[name]) for name in _TEXTS}
     joints = texts["joints"].tolist()
     parents = _check_parents(path, fields["parents"], joints)
-    frame_rate = _check_frame_rates(path, fields["fps"])
+    fps = fields["fps"]
+    if fps.dtype.kind not in "iuf" or ((fps < RATES[0]) | (fps > RATES[1])).any():
+        raise ValueError(
+            f"{path}: fps must be frames per second, above 0, or NaN if it is not known, got "
+            f"{_quote(fps)}."
+        )
     try:
         skeleton = Skeleton(joints, parents)
     except ValueError:
@@ -97,7 +102,7 @@ def load_trials(path: Path) -> Bunch:
         take=texts["take"],
         joints=joints,
         skeleton=skeleton,
-        frame_rate=frame_rate,
+        frame_rate=fps.astype(np.float64),
     )
 
 
@@ -167,15 +172,6 @@ def _check_parents(path, parents, joints):
             f"they form a cycle, got {_quote(parents)}."
         )
     return parents.tolist()
-
-
-def _check_frame_rates(path, fps):
-    if fps.dtype.kind not in "iuf" or ((fps < RATES[0]) | (fps > RATES[1])).any():
-        raise ValueError(
-            f"{path}: fps must be frames per second, above 0, or NaN if it is not known, got "
-            f"{_quote(fps)}."
-        )
-    return fps.astype(np.float64)
 
 
 def _quote(values):

@@ -59,7 +59,9 @@ class TrialFacts(NamedTuple):
         ValueError
             If X is no set of trials, or there is no such frame rate.
         """
-        is_plain = isinstance(X, Trials) or _are_lengths(X)
+        is_plain = hasattr(X, "__len__") and not isinstance(X, Mapping)
+        is_plain = is_plain and not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X)
+        is_plain = is_plain or isinstance(X, Trials)
         is_read = is_plain or (checked is not None and as_source(X) is not None)
         sequences = None if is_read else as_collection(X)
         if sequences is None and not is_plain and checked is not None:
@@ -135,9 +137,3 @@ class TrialFacts(NamedTuple):
     def index(self):
         """The labels as an index, of several levels if they have several."""
         return index_of(self.labels, self.levels[:-1])
-
-
-def _are_lengths(X):
-    """Whether X holds how many frames trials have, instead of the trials."""
-    is_plain = hasattr(X, "__len__") and not isinstance(X, Mapping) and not hasattr(X, "columns")
-    return is_plain and all(np.ndim(n) == 0 for n in X)

@@ -345,7 +345,11 @@ def _frames(text, n_dofs, header, asf):
     number, frame = None, {}
     for words in text.lines():
         if words[0].startswith((b"#", b":")):
-            _read_setting(text, words, header)
+            key = words[0].upper()
+            if key in (b":DEGREES", b":RADIANS"):
+                header["degrees"] = key == b":DEGREES"
+            elif key == b":SAMPLES-PER-SECOND":
+                header["frame_rate"] = text.positive(words[1:], ":SAMPLES-PER-SECOND")
         elif len(words) == 1 and words[0].isdigit():
             if len(words[0]) > 18 or (number is not None and int(words[0]) != number + 1):
                 raise text.error(
@@ -365,14 +369,6 @@ def _frames(text, n_dofs, header, asf):
             frame[name] = text.numbers(words[1:], n_dofs[name], f"bone {name[:60]!r}")
     if number is not None:
         yield number, frame
-
-
-def _read_setting(text, words, header):
-    key = words[0].upper()
-    if key in (b":DEGREES", b":RADIANS"):
-        header["degrees"] = key == b":DEGREES"
-    elif key == b":SAMPLES-PER-SECOND":
-        header["frame_rate"] = text.positive(words[1:], ":SAMPLES-PER-SECOND")
 
 
 def _place_bones(bones, in_degrees, values, degrees):

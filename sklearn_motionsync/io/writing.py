@@ -116,7 +116,9 @@ def write_motion(
         joints, parents, points, up = _read_positions(X, skeleton, path)
         _printable(joints, path)
         if in_place:
-            points = _in_place(points, parents, up)
+            way = points[:, [parents.index(-1)]] - points[:1, [parents.index(-1)]]
+            way[..., "xyz".index(up[-1])] = 0
+            points = points - way
         if ending == ".trc":
             text = _write_trc(joints, points, rate, times, X, path)
         else:
@@ -149,13 +151,6 @@ def _read_positions(X, skeleton, path):
         )
     points = x.astype(np.float64).reshape(len(x), -1, 3)
     return names, list(parents), points, up
-
-
-def _in_place(points, parents, up):
-    """Positions without the horizontal way of the first root."""
-    way = points[:, [parents.index(-1)]] - points[:1, [parents.index(-1)]]
-    way[..., "xyz".index(up[-1])] = 0
-    return points - way
 
 
 # -- BVH ---------------------------------------------------------------------------------
