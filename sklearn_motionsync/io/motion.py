@@ -69,11 +69,6 @@ class MotionFormat(NamedTuple):
     fits: Callable[[FilePath, bytes], bool]
     read: Callable[..., dict]
 
-    @property
-    def keys(self):
-        """What ``attrs["format"]`` may be."""
-        return (self.name,) if self.name else tuple(x.removeprefix(".") for x in self.endings)
-
 
 # The first bytes of a file, by which its format is known.
 _HEAD = 2**16

@@ -206,25 +206,21 @@ def _plain_numbers(text, n):
         return None
     if text.isspace():
         return np.empty((0, n))
-    # Numbers between single blanks are read faster than those between any, as the first line has.
-    first = text[: text.find(b"\n")]
-    for blanks in (" ", r"\s+")[b" ".join(first.split()) != first :]:
-        try:
-            numbers = pd.read_csv(
-                io.BytesIO(text),
-                header=None,
-                sep=blanks,
-                dtype=np.float64,
-                na_filter=False,
-                engine="c",
-                low_memory=False,
-                **EXACT,
-            ).to_numpy()
-        except ValueError:
-            continue
-        limited = max(numbers.max(), -numbers.min()) < _LARGEST
-        return numbers if numbers.shape[1] == n and limited else None
-    return None
+    try:
+        numbers = pd.read_csv(
+            io.BytesIO(text),
+            header=None,
+            sep=r"\s+",
+            dtype=np.float64,
+            na_filter=False,
+            engine="c",
+            low_memory=False,
+            **EXACT,
+        ).to_numpy()
+    except ValueError:
+        return None
+    limited = max(numbers.max(), -numbers.min()) < _LARGEST
+    return numbers if numbers.shape[1] == n and limited else None
 
 
 def _is_number(word, below=_LARGEST):

@@ -16,7 +16,11 @@ from plain_readers import PLAIN
 ROOT = Path(__file__).resolve().parents[2]
 MANUAL = (ROOT / "docs" / "howto" / "motion_files.md").read_text(encoding="utf-8")
 # What attrs["format"] may be.
-KEYS = [key for each in FORMATS for key in each.keys]
+KEYS = [
+    each.name or ending.removeprefix(".")
+    for each in FORMATS
+    for ending in (each.endings if each.name is None else [""])
+]
 
 
 def read_example(folder, key, **params):
