@@ -22,7 +22,7 @@ from ..inputs.validation import (
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from .axes import fill_heading, heading_axes, to_y_up
+from .axes import check_upright, fill_heading, heading_axes, to_y_up
 from .columns import check_columns, plain_positions
 from .formats import LANDMARKS, SIDES
 from .limbs import (
@@ -37,7 +37,6 @@ from .limbs import (
     median_lengths,
     scale_missing_lengths,
 )
-from .upright import check_upright
 
 # Frames whose points are computed at a time: they stay in the cache.
 PORTION = 4096

@@ -13,7 +13,7 @@ import pandas as pd
 from ..inputs.numbers import as_numbers, is_integer
 from ..inputs.types import UpAxis
 from ..inputs.wording import counted
-from .axes import UP_AXES
+from .axes import UP_AXES, estimate_up
 from .columns import joint_columns
 from .formats import AXES, FORMATS, LANDMARKS, SIDES
 from .landmarks import (
@@ -24,7 +24,6 @@ from .landmarks import (
     nearest_names,
 )
 from .limbs import LIMBS, complete_legs, features_of_parts, landmark_positions, limbs_between
-from .upright import estimate_up
 
 # A root that moves less than this share of the largest coordinate stands still, and the length of a
 # bone that changes less does not.
