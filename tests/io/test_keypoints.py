@@ -343,3 +343,10 @@ def test_wrong_tables_are_refused_with_the_place(tmp_path, text, message):
     with pytest.raises(ValueError, match=message) as caught:
         read_motion(path)
     assert str(caught.value).startswith(str(path))
+
+
+def test_the_confidence_is_cut_with_the_frames(tmp_path):
+    rows = [[np.nan, np.nan, 0.1], [1, 2, 0.2], [3, 4, 0.3], [5, 6, 0.4]]
+    path = put(tmp_path, table(["hip_x", "hip_y", "hip_likelihood"], rows), "a.csv")
+    df = read_motion(path, frame_rate=30, ends="trim", quality="keep")
+    assert df["hip_confidence"].tolist() == [0.2, 0.3, 0.4]
