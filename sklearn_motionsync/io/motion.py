@@ -194,9 +194,8 @@ def read_motion(
     check_confidence(min_confidence, quality)
     files, known = _files_of(path, columns)
     of_reader: dict[str, Any] = {"asf": asf, "group": group}
-    of_table: dict[str, Any] = {
-        "max_gap": max_gap, "ends": ends, "min_confidence": min_confidence, "quality": quality
-    }  # fmt: skip
+    of_table: dict[str, Any] = {"max_gap": max_gap, "ends": ends}
+    of_table |= {"min_confidence": min_confidence, "quality": quality}
     if known is None:
         options = {"frame_rate": frame_rate, "subject": subject, "verbose": verbose}
         return _read_several(files, columns, of_reader | of_table | options)
