@@ -254,10 +254,11 @@ def test_every_function_has_its_row():
         parameters = inspect.signature(function).parameters
         takes_trials = "X" in parameters and bool({"estimator", "params"} & set(parameters))
         if takes_trials or "keyframes" in parameters:
-            names.add(name)
+            # Scorers are called; scikit-learn knows the same as their method score.
+            names.add(name.replace("Scorer.score", "Scorer"))
         if "estimator" in parameters and "Match" in str(parameters["estimator"].annotation):
             of_match.add(name)
-    assert names == (set(CALLS) - {n for n in CALLS if n.endswith(("Scorer", ".lags"))}) | OTHERS
+    assert names == (set(CALLS) - {n for n in CALLS if n.endswith(".lags")}) | OTHERS
     assert of_match == OF_MATCH
 
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn import get_config
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
-from sklearn.utils.metadata_routing import MetadataRequest
+from sklearn.utils.metadata_routing import UNUSED
 
 from ..inputs.keyframes import Keyframes
 from ..inputs.types import RandomState, TrialsLike
@@ -23,13 +21,20 @@ __all__ = ["FeatureHoldoutScorer", "SpreadScorer"]
 
 
 class _SynchronizerScorer(BaseEstimator):
-    """Base of the scorers: the metadata requests, and what is scored.
+    """Base of the scorers: the metadata that may be requested, and what is scored.
 
     A scorer has a ``_score(reached, params)``, of the synchronizer and the trials that `_reach`
     found; ``_uses`` names the methods whose metadata it takes.
     """
 
     _uses: tuple[str, ...] = ("match",)
+    # Key-frames that are given but neither requested nor declined are an error.
+    __metadata_request__score = {
+        "estimator": UNUSED,
+        "keyframes": None,
+        "frame_rate": False,
+        "confidence": False,
+    }
 
     def __call__(
         self, estimator: BaseEstimator, X: TrialsLike, y: object = None, **params: Any
@@ -64,52 +69,8 @@ class _SynchronizerScorer(BaseEstimator):
         """
         return self._score(self._reach(estimator, X, params), params)
 
-    def get_metadata_routing(self):
-        """The metadata that the scorer requests from cross-validation and searches.
-
-        Returns
-        -------
-        MetadataRequest
-            As of scikit-learn.
-        """
-        request = MetadataRequest(owner=type(self).__name__)
-        for name, alias in self._current_requests().items():
-            request.score.add_request(param=name, alias=alias)
-        return request
-
-    def set_score_request(self, **requests):
-        """Request metadata, such as key-frames, in cross-validation and searches.
-
-        Needs ``sklearn.set_config(enable_metadata_routing=True)``.
-
-        Parameters
-        ----------
-        **requests : dict of bool, None or str
-            For each name of metadata: True requests it, False does not, None makes it an
-            error to give it, and a string is the name under which it is given.
-
-        Returns
-        -------
-        SpreadScorer or FeatureHoldoutScorer
-            The scorer itself.
-        """
-        if not get_config()["enable_metadata_routing"]:
-            raise RuntimeError(
-                "Metadata is only routed to scorers when scikit-learn's metadata routing is "
-                "enabled: sklearn.set_config(enable_metadata_routing=True)."
-            )
-        for name, alias in requests.items():
-            # Refuses invalid requests.
-            MetadataRequest(owner=type(self).__name__).score.add_request(param=name, alias=alias)
-        self._requests = {**self._current_requests(), **requests}
-        return self
-
-    def __sklearn_clone__(self):
-        return deepcopy(self)
-
-    def _current_requests(self):
-        # Key-frames that are given but neither requested nor declined are an error.
-        return getattr(self, "_requests", {"keyframes": None})
+    # Of a method of this name scikit-learn makes `set_score_request`.
+    score = __call__
 
     def _reach(self, estimator, X, params):
         """The synchronizer and the trials, at least two."""

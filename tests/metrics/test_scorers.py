@@ -283,17 +283,18 @@ def test_set_score_request_needs_metadata_routing():
 @pytest.mark.parametrize("scorer", SCORERS)
 def test_scorer_keeps_requests_when_cloned_and_pickled(scorer, bunch, points):
     scoring = scorer().set_score_request(keyframes=True)
+    requests = {"keyframes": True, "frame_rate": False, "confidence": False}
     sync = LinearSynchronizer(40).fit(points, keyframes=bunch.keyframes)
     expected = scoring(sync, points, keyframes=bunch.keyframes)
     nested = clone(GridSearchCV(sync, {"n_frames": [40]}, scoring=scoring)).scoring
     for copy in (clone(scoring), pickle.loads(pickle.dumps(scoring)), nested):
         assert copy is not scoring
         assert copy(sync, points, keyframes=bunch.keyframes) == expected
-        assert copy.get_metadata_routing().score.requests == {"keyframes": True}
+        assert copy.get_metadata_routing().score.requests == requests
         assert repr(copy) == repr(scoring) == f"{scorer.__name__}()"
     # A copy's requests are its own.
     clone(scoring).set_score_request(keyframes=False)
-    assert scoring.get_metadata_routing().score.requests == {"keyframes": True}
+    assert scoring.get_metadata_routing().score.requests == requests
 
 
 # -- refusals -----------------------------------------------------------------------------
