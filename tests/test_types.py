@@ -169,7 +169,7 @@ keyframes_from_events(X, pd.DataFrame({"trial": [0], "event": "a", "frame": 5}),
 TimingChannel(LinearSynchronizer(), "frames").fit_transform(X).shape
 ActionModel(coverage=0.9).fit(X, groups=["ann", "ann", "bob"]).envelope()[0].shape
 ActionModel().fit(X, groups=pd.Series([0, 1, 2])).sample(2, random_state=0).tolist()
-ActionClassifier(costs=["velocity"], n_jobs=1)
+ActionClassifier(n_landmarks=None, n_jobs=1)
 Skeleton.coco(n_dims=2, up="-y").landmarks["pelvis"]
 Skeleton(["hip", "knee"], [-1, 0], {"left_hip": "hip", "left_knee": ["knee"]}).column_names
 DirectionCosines(Skeleton.paper(), hidden="nan")
@@ -204,7 +204,7 @@ TimingChannel(LinearSynchronizer(), "rate").fit(X)
 ActionModel(n_std="three").fit(X)
 ActionModel().fit(X, groups=3)
 ActionModel().fit(X).sample("all")
-ActionClassifier(costs="velocities").fit(X, [0, 1, 0])
+ActionClassifier(reject_below="never").fit(X, [0, 1, 0])
 CycleSegmenter(not_cyclic="ignore").fit(X)
 OnlineSynchronizer(DenseSynchronizer).fit(X)
 Skeleton.paper(n_dims=4)

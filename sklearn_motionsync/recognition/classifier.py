@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Hashable, Sequence
-from functools import partial
+from collections.abc import Hashable
 from numbers import Integral, Real
 from typing import Literal, Self
 
@@ -16,9 +15,8 @@ from sklearn.pipeline import Pipeline
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.types import Cost, Labels, TrialsLike, ValuesLike
+from ..inputs.types import Labels, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin
-from ..matching.costs import COSTS
 from ..matching.counting import first_largest
 from ..model.action_model import ActionModel
 from ..synchronizers.dense import DenseSynchronizer
@@ -29,17 +27,14 @@ from ..utils.groups import (
     encode_groups,
     refuse_classes_as_people,
 )
-from ..utils.parallel import LongWorkMixin, run
+from ..utils.parallel import LongWorkMixin, one_blas_thread
 from ..utils.parameters import validated
-from .distances import PairwiseDistance
 from .kernel import MotionKernel, assign_folds, decision_values, fit_regression
 
 __all__ = ["ActionClassifier"]
 
 # The coverage of reject_below="auto".
 _COVERAGE = 0.95
-# Largest offset of the distances, as a share of the clock.
-_MAX_OFFSET = 0.4
 # The golden ratio less 1.
 _GOLDEN = (5**0.5 - 1) / 2
 
@@ -74,26 +69,17 @@ class ActionClassifier(
 
     Parameters
     ----------
-    costs : str or list of str, default=("velocity", "elastic", "pose")
-        The costs of the distances, each once, out of these three. May be empty with
-        ``summaries``: then nothing is warped.
     C : float, default=10
         Inverse strength of the penalty of the regression.
-    gamma : float, default=1
-        A kernel is ``exp(-gamma D / median(D))``, the median over all training pairs.
-    summaries : bool, default=True
-        Whether summaries of every feature make kernels, too: of its values, and of its changes.
     n_landmarks : int or None, default=250
         If there are more than twice as many trials, they are compared with so many of them
         only, chosen evenly from all classes and groups (Nyström's method). None compares all.
     n_frames : int, default=50
         ``P``, frames of the common clock. Time grows with its square.
     reject_below : float, "auto" or None, default=None
-        Trials whose largest decision value is below get ``unknown_label``; None rejects nothing.
-        ``"auto"`` is ``threshold_at(0.95)``. ``fit`` does not use it: it can be set afterwards.
-    unknown_label : label, default=None
-        The label of rejected trials, which is none of the classes; by default "unknown" among
-        text, -1 among numbers, NaT among dates.
+        Trials whose largest decision value is below get "unknown" among text, -1 among numbers, NaT
+        among dates, which must be none of the classes; None rejects nothing. ``"auto"`` is
+        ``threshold_at(0.95)``. ``fit`` does not use it: it can be set afterwards.
     n_jobs : int, default=None
         How many jobs share the comparisons, in ``fit`` and after it. None means 1 unless in a
         ``joblib.parallel_config`` context, -1 all cores. Results are the same to the last bit.
@@ -106,9 +92,8 @@ class ActionClassifier(
         The classes, sorted.
     landmarks_ : ndarray of int, shape (n_landmarks,)
         The training trials that others are compared with: their indices, rising.
-    weights_ : ndarray, shape (n_kernels,)
-        The weights of shape, poses, summaries and changes, of those that ``costs`` and
-        ``summaries`` name, in this order. They sum to 1.
+    weights_ : ndarray, shape (4,)
+        The weights of shape, poses, summaries and changes. They sum to 1.
     temperature_ : float
         The factor of decision values in probabilities, estimated from held-out trials.
     held_out_ : ndarray, shape (n_sequences,)
@@ -154,14 +139,10 @@ class ActionClassifier(
     """
 
     _parameter_constraints: dict = {
-        "costs": ["array-like", StrOptions(set(COSTS))],
         "C": [Interval(Real, 0, None, closed="neither")],
-        "gamma": [Interval(Real, 0, None, closed="neither")],
-        "summaries": ["boolean"],
         "n_landmarks": [Interval(Integral, 2, None, closed="left"), None],
         "n_frames": [Interval(Integral, 2, None, closed="left")],
         "reject_below": [Interval(Real, None, None, closed="neither"), StrOptions({"auto"}), None],
-        "unknown_label": [str, Integral, Real, None],
         "n_jobs": [Integral, None],
         "verbose": ["verbose"],
     }
@@ -172,26 +153,18 @@ class ActionClassifier(
 
     def __init__(
         self,
-        costs: Cost | Sequence[Cost] = ("velocity", "elastic", "pose"),
         *,
         C: float = 10,
-        gamma: float = 1,
-        summaries: bool = True,
         n_landmarks: int | None = 250,
         n_frames: int = 50,
         reject_below: float | Literal["auto"] | None = None,
-        unknown_label: str | float | None = None,
         n_jobs: int | None = None,
         verbose: int = 0,
     ) -> None:
-        self.costs = costs
         self.C = C
-        self.gamma = gamma
-        self.summaries = summaries
         self.n_landmarks = n_landmarks
         self.n_frames = n_frames
         self.reject_below = reject_below
-        self.unknown_label = unknown_label
         self.n_jobs = n_jobs
         self.verbose = verbose
 
@@ -217,12 +190,9 @@ class ActionClassifier(
         ------
         ValueError
             If the input breaks the contract, there are not two classes, there is not a class or
-            group for each trial, groups tell the same trials apart as classes, or costs are
-            unknown.
+            group for each trial, or groups tell the same trials apart as classes.
         """
-        kernel = MotionKernel(
-            self._comparisons(), self.gamma, self.summaries, n_frames=int(self.n_frames)
-        )
+        kernel = MotionKernel(int(self.n_frames))
         trials = self._check_training_set(X)
         classes, codes = encode_classes(y, trials, type(self).__name__)
         if groups is not None:
@@ -234,12 +204,15 @@ class ActionClassifier(
                 trials, landmarks, codes, groups, n_jobs=self.n_jobs, progress=progress
             )
             folds = assign_folds(codes, groups)
-            fit_in_portion = partial(fit_regression, self.C, folds, landmarks)
             step = progress.stage("regression", 1)
-            (result,) = run(fit_in_portion, [(matrix, codes)], step=step)
+            with one_blas_thread():
+                regression, temperature, held_out, gain = fit_regression(
+                    self.C, folds, landmarks, matrix, codes
+                )
+            step()
         self.classes_, self.landmarks_ = classes, landmarks
-        self._regression, self.temperature_ = result.regression, result.temperature
-        self.held_out_, self.held_out_gain_ = result.held_out, result.gain
+        self._regression, self.temperature_ = regression, temperature
+        self.held_out_, self.held_out_gain_ = held_out, gain
         self._kernel, self.weights_ = kernel, kernel.weights
         # Copies, which do not change with the user's arrays.
         self._training = [np.array(x) for x in trials], codes, groups
@@ -256,7 +229,7 @@ class ActionClassifier(
         Returns
         -------
         ndarray, shape (n_sequences,)
-            Classes, and ``unknown_label`` for those that ``reject_below`` rejects. If it is not
+            Classes, and "unknown", -1 or NaT for those that ``reject_below`` rejects. If it is not
             None, the dtype holds both: with classes of 8 bits without sign, and -1, it is int64.
         """
         decisions = self._decisions(X)
@@ -267,7 +240,7 @@ class ActionClassifier(
         if isinstance(threshold, str):
             threshold = self.threshold_at(_COVERAGE)
         codes[decisions.max(axis=1) < threshold] = len(self.classes_)
-        return add_unknown_label(self.classes_, self.unknown_label)[codes]
+        return add_unknown_label(self.classes_)[codes]
 
     def score(self, X: TrialsLike, y: Labels, sample_weight: ValuesLike | None = None) -> float:
         """Share of trials that are given their class.
@@ -417,28 +390,6 @@ class ActionClassifier(
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
         return tags
-
-    def _comparisons(self):
-        """The comparison of each cost."""
-        costs = [self.costs] if isinstance(self.costs, str) else list(self.costs)
-        unknown = [cost for cost in costs if cost not in COSTS]
-        if unknown or len(set(costs)) < len(costs) or not (costs or self.summaries):
-            raise ValueError(
-                f"costs must be some of {list(COSTS)}, each once, and at least one of them without "
-                f"summaries; got {self.costs!r}."
-            )
-        # Poses keep the unit of the training set. A kernel needs no more than single precision:
-        # six digits of a distance.
-        return [
-            PairwiseDistance(
-                cost,
-                normalize=cost != "pose",
-                n_frames=int(self.n_frames),
-                max_offset=_MAX_OFFSET,
-                dtype=np.float32,
-            )
-            for cost in costs
-        ]
 
     def _decisions(self, X):
         """Decision values of trials: (n_sequences, n_classes)."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from functools import partial
-from numbers import Integral, Real
+from numbers import Integral
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -41,18 +41,17 @@ __all__ = [
 BLOCK = 16
 # Blocks of a job's portion: enough to outweigh its overhead, and few enough for many jobs.
 _PORTION_BLOCKS = 32
+# Standard deviation of the Gaussian under which velocities are estimated, as a share of the trial.
+_SMOOTHING = 0.06
+# Weight of the changes of pace, ``mu``, in units of the squared features of a frame, and the
+# largest rate of a path.
+_SMOOTHNESS, _MAX_RATE = 0.003, 4
 
 
 @validated_function(
     {
         "cost": [StrOptions(set(COSTS))],
-        "normalize": ["boolean"],
-        "symmetric": ["boolean"],
         "n_frames": [Interval(Integral, 2, None, closed="left")],
-        "velocity_smoothing": [Interval(Real, 0, 1, closed="both")],
-        "max_offset": [Interval(Real, 0, 1, closed="both")],
-        "smoothness": [Interval(Real, 0, None, closed="left")],
-        "max_rate": [Interval(Real, 1, None, closed="left")],
         "n_jobs": [Integral, None],
         "verbose": ["verbose"],
     }
@@ -62,21 +61,16 @@ def synchronization_distances(
     Y: TrialsLike | None = None,
     *,
     cost: Cost = "elastic",
-    normalize: bool = True,
-    symmetric: bool = True,
     n_frames: int = 50,
-    velocity_smoothing: float = 0.06,
-    max_offset: float = 0.25,
-    smoothness: float = 0.003,
-    max_rate: float = 4,
     n_jobs: int | None = None,
     verbose: int = 0,
 ) -> np.ndarray:
     """Synchronisation distances between all pairs of trials (Eq. 12).
 
-    A distance is the difference of two trials after one is warped to the other: for nearest
-    neighbours, kernels, clusters and embeddings. It depends on the pair alone, to the last bit,
-    not on the other trials.
+    A distance is the difference of two trials after one is warped to the other, in the mean of both
+    directions: for nearest neighbours, kernels, clusters and embeddings. It depends on the pair
+    alone, to the last bit, not on the other trials. The compared features of each trial are divided
+    by their own root mean square, which removes amplitude and unit.
 
     Parameters
     ----------
@@ -86,26 +80,8 @@ def synchronization_distances(
         Other trials, with the same features. By default X, with 0 on the diagonal.
     cost : {"elastic", "velocity", "pose"}, default="elastic"
         The features that are compared, as in `DenseSynchronizer`.
-    normalize : bool, default=True
-        Whether the compared features of each trial are divided by their own root mean
-        square, which removes amplitude and unit. A trial that stands still is
-        ``2 * n_frames`` away from any that moves.
-    symmetric : bool, default=True
-        Whether to average both directions. Otherwise the rows are the trials whose
-        clock is kept, ``n`` of ``D_{n,m}``, and the columns those that are warped, ``m``.
     n_frames : int, default=50
         ``P``, frames of the common clock. The distance is a sum over them.
-    velocity_smoothing : float, default=0.06
-        Standard deviation of the Gaussian under which velocities are estimated, as a share of the
-        trial.
-    max_offset : float, default=0.25
-        Largest offset, as a share of the clock, in [0, 1].
-    smoothness : float, default=0.003
-        Weight ``mu`` of the changes of pace, in units of the mean squared norm of the features of
-        a frame: that is 1 with ``normalize``. Without, it is in units of the
-        data: their square, for the elastic cost their first power.
-    max_rate : float, default=4
-        Largest local rate of a path.
     n_jobs : int, default=None
         How many jobs share the pairs. None means 1 unless in a ``joblib.parallel_config`` context,
         -1 all cores. Results are the same to the last bit.
@@ -115,9 +91,10 @@ def synchronization_distances(
     Returns
     -------
     ndarray, shape (n_X, n_Y)
-        0 or more, in double precision: squares of the features, summed over the clock, and ``mu``
-        times the penalties of the path. With ``normalize`` uncorrelated trials are
-        ``2 * n_frames`` apart, and opposite ones up to twice that.
+        0 or more, in double precision: squares of the features, summed over the clock, and 0.003
+        times the penalties of the path. Uncorrelated trials are ``2 * n_frames`` apart, and
+        opposite ones up to twice that. A trial that stands still is ``2 * n_frames`` away from any
+        that moves.
 
     Raises
     ------
@@ -156,22 +133,13 @@ def synchronization_distances(
     if Y is not None:
         on_rows = bases.kind == "rows"
         moving = check_input(reader, Y, reset=False, level="sequence", on_rows=on_rows)
-    comparison = PairwiseDistance(
-        cost,
-        normalize=normalize,
-        n_frames=int(n_frames),
-        velocity_smoothing=velocity_smoothing,
-        max_offset=max_offset,
-        smoothness=smoothness,
-        max_rate=max_rate,
-    )
+    comparison = PairwiseDistance(cost, n_frames=int(n_frames))
     return pairwise_distances(
         comparison,
         comparison.features(normalise_time(bases, comparison.n_frames)),
         None
         if moving is None
         else comparison.features(normalise_time(moving, comparison.n_frames)),
-        symmetric=symmetric,
         n_jobs=n_jobs,
         progress=Progress(reader, verbose),
     )
@@ -182,16 +150,14 @@ def normalise_time(trials, n_frames):
     return normalise([np.asarray(x, dtype=np.float64) for x in trials], n_frames)
 
 
-def pairwise_distances(comparison, X, Y=None, *, symmetric=True, n_jobs=None, progress, name=""):
+def pairwise_distances(comparison, X, Y=None, *, n_jobs=None, progress, name=""):
     """Distances (n_X, n_Y) between trials, given the features (n, P, n_features) that are compared.
 
-    Without Y they are those within X, and symmetric ones are means of both directions. The name is
-    appended to the message of the progress.
+    They are means of both directions; without Y they are those within X. The name is appended to
+    the message of the progress.
     """
     directed = partial(_directed, comparison, n_jobs=n_jobs, progress=progress, name=name)
     there = directed(X, X if Y is None else Y)
-    if not symmetric:
-        return there
     back = there if Y is None else directed(Y, X)
     return there / 2 + back.T / 2
 
@@ -224,37 +190,20 @@ class PairwiseDistance:
     ----------
     cost : str
         A key of ``costs.COSTS``.
-    normalize : bool
-        Whether the features of every trial are divided by their own root mean square.
     n_frames : int
         Of the clock.
-    max_offset : float
+    normalize : bool, default=True
+        Whether the features of every trial are divided by their own root mean square.
+    max_offset : float, default=0.25
         As a share of the clock.
-    velocity_smoothing : float, default=0.06
-        As a share of the clip.
-    smoothness : float, default=0.003
-        Weight of changes of pace, in units of the squared features of a frame.
-    max_rate : float, default=4
     dtype : type, default=numpy.float64
         Of the features that are compared, and of distances. numpy.float32 takes 0.6 of the time.
     """
 
-    def __init__(
-        self,
-        cost,
-        *,
-        normalize,
-        n_frames,
-        max_offset,
-        velocity_smoothing=0.06,
-        smoothness=0.003,
-        max_rate=4,
-        dtype=np.float64,
-    ):
-        self.cost, self.normalize, self.smoothing = cost, normalize, velocity_smoothing
-        self.n_frames, self.dtype = n_frames, dtype
+    def __init__(self, cost, *, n_frames, normalize=True, max_offset=0.25, dtype=np.float64):
+        self.cost, self.normalize, self.n_frames, self.dtype = cost, normalize, n_frames, dtype
         self.trellis = Trellis.on_clock(
-            cost, n_frames, float(smoothness), max_offset=max_offset, max_rate=max_rate
+            cost, n_frames, _SMOOTHNESS, max_offset=max_offset, max_rate=_MAX_RATE
         )
 
     def features(self, on_clock):
@@ -267,7 +216,7 @@ class PairwiseDistance:
             on_clock, size = np.ldexp(on_clock, -exponents), np.ldexp(size, -exponents)
         is_constant = np.ptp(on_clock, axis=1, keepdims=True) <= CONSTANT * size
         on_clock = np.where(is_constant, on_clock[:, :1], on_clock)
-        features = cost_features(on_clock, self.cost, smoothing=self.smoothing)
+        features = cost_features(on_clock, self.cost, smoothing=_SMOOTHING)
         if not self.normalize:
             return features.astype(self.dtype, copy=False)
         energy = _energies(features)[:, np.newaxis, np.newaxis] / self.n_frames

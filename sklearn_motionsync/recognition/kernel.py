@@ -1,7 +1,5 @@
 """MotionKernel: how alike trials are, and the multinomial regression with it."""
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
@@ -11,10 +9,9 @@ from sklearn.linear_model import LogisticRegression
 from sklearn.model_selection import GroupKFold
 
 from ..matching.counting import first_largest
-from .distances import normalise_time, pairwise_distances
+from .distances import PairwiseDistance, normalise_time, pairwise_distances
 
 __all__ = [
-    "Fitted",
     "KernelRegression",
     "MotionKernel",
     "align_weights",
@@ -29,8 +26,10 @@ __all__ = [
     "held_out_decisions",
 ]
 
-# The cost that compares poses; the others compare velocities.
-_POSE = "pose"
+# The costs of the distances: two of velocities, which make the view of shape, and one of poses.
+_COSTS = "velocity", "elastic", "pose"
+# Largest offset of the distances, as a share of the clock.
+_MAX_OFFSET = 0.4
 # Standard deviations below this share of the size of the data are rounding.
 _ROUNDING = 2.0**-44
 # Frames that are averaged for the start and the end of a trial.
@@ -44,12 +43,12 @@ _POWER = 6
 
 
 class MotionKernel:
-    """A weighted mean of kernels ``exp(-gamma D / median(D))``, medians over the training pairs.
+    """A weighted mean of kernels ``exp(-D / median(D))``, medians over the training pairs.
 
-    There are up to four views of trials. `comparisons` of velocities make the first, those of
-    poses the second, each ``D`` a matrix of synchronisation distances. The third is of
-    `summary_statistics`, the last of `change_extremes` and `change_shares`: squared Euclidean
-    distances, in standard deviations of the training set. A view is the mean of its kernels.
+    There are four views of trials. Distances by costs of velocities make the first, and by the cost
+    of poses the second. The third is of `summary_statistics`, the last of `change_extremes` and
+    `change_shares`: squared Euclidean distances, in standard deviations of the training set. A
+    view is the mean of its kernels.
 
     Trials are compared with landmarks of the training set. If these are not all of it, the
     views are not added up, but stand side by side: each then has a regression of its own, which
@@ -57,30 +56,35 @@ class MotionKernel:
 
     Parameters
     ----------
-    comparisons : list of Comparison
-    gamma : float
-    summaries : bool
-        Whether the last two views are there.
     n_frames : int
         Of the clock.
 
     Attributes
     ----------
-    weights : ndarray, shape (n_views,)
+    weights : ndarray, shape (4,)
         By `align_weights`.
     """
 
-    def __init__(self, comparisons, gamma, summaries, *, n_frames):
-        self.comparisons, self.gamma, self.summaries = comparisons, gamma, summaries
+    def __init__(self, n_frames):
         self.n_frames = n_frames
-        views = [int(c.cost == _POSE) for c in comparisons] + [2, 3, 3] * bool(summaries)
-        self._views = np.unique(views, return_inverse=True)[1]
+        # Poses keep the unit of the training set. A kernel needs no more than single precision:
+        # six digits of a distance.
+        self._comparisons = [
+            PairwiseDistance(
+                cost,
+                n_frames=n_frames,
+                normalize=cost != "pose",
+                max_offset=_MAX_OFFSET,
+                dtype=np.float32,
+            )
+            for cost in _COSTS
+        ]
 
     def fit(self, trials, landmarks, codes, groups=None, **jobs):
         """Estimate units, medians and weights from the training set, and return its kernel.
 
         Landmarks are indices of trials, and classes and groups (n,) are counted from 0. ``jobs``
-        are ``n_jobs`` and ``progress``. The kernel is (n, n), or (n, n_views * n_landmarks).
+        are ``n_jobs`` and ``progress``. The kernel is (n, n), or (n, 4 * n_landmarks).
         """
         frames = [x.astype(np.float64, copy=False) for x in trials]
         self._center = np.concatenate(frames).mean(axis=0)
@@ -88,30 +92,30 @@ class MotionKernel:
         self._unit = np.sqrt(np.mean(variances)) or 1.0
         scaled = self._scale(trials)
         on_clock = normalise_time(scaled, self.n_frames)
-        features = [c.features(on_clock) for c in self.comparisons]
+        features = [c.features(on_clock) for c in self._comparisons]
         self._features = [f[landmarks] for f in features]
         # Landmarks among themselves, so that no pair is compared twice, and the others with them.
         is_other = np.ones(len(scaled), dtype=bool)
         is_other[landmarks] = False
-        distances = np.empty((len(self._views), len(scaled), len(landmarks)))
-        for i, (c, f) in enumerate(zip(self.comparisons, features, strict=True)):
+        summaries_from = len(features)
+        distances = np.empty((summaries_from + 3, len(scaled), len(landmarks)))
+        for i, (c, f) in enumerate(zip(self._comparisons, features, strict=True)):
             d, known, name = distances[i], self._features[i], f" by {c.cost}"
             d[landmarks] = pairwise_distances(c, known, name=name, **jobs)
             if is_other.any():
                 d[is_other] = pairwise_distances(c, f[is_other], known, name=name, **jobs)
-        if self.summaries:
-            rounding = _ROUNDING * max(1.0, np.abs(self._center).max() / self._unit)
-            self._change_units = _change_units(on_clock, rounding)
-            self._scalings, self._summaries = [], []
-            for d, statistics in zip(
-                distances[len(features) :], self._summarised(scaled, on_clock), strict=True
-            ):
-                mean, std = statistics.mean(axis=0), statistics.std(axis=0)
-                # Statistics that are constant in the training set have no weight.
-                self._scalings.append((mean, np.where(std > rounding, std, np.inf)))
-                statistics = (statistics - mean) / self._scalings[-1][1]
-                self._summaries.append(statistics[landmarks])
-                d[:] = cdist(statistics, self._summaries[-1], "sqeuclidean")
+        rounding = _ROUNDING * max(1.0, np.abs(self._center).max() / self._unit)
+        self._change_units = _change_units(on_clock, rounding)
+        self._scalings, self._summaries = [], []
+        for d, statistics in zip(
+            distances[summaries_from:], self._summarised(scaled, on_clock), strict=True
+        ):
+            mean, std = statistics.mean(axis=0), statistics.std(axis=0)
+            # Statistics that are constant in the training set have no weight.
+            self._scalings.append((mean, np.where(std > rounding, std, np.inf)))
+            statistics = (statistics - mean) / self._scalings[-1][1]
+            self._summaries.append(statistics[landmarks])
+            d[:] = cdist(statistics, self._summaries[-1], "sqeuclidean")
         is_pair = np.ones(distances[0].shape, dtype=bool)
         is_pair[landmarks, np.arange(len(landmarks))] = False
         self._medians = [_positive_median(d[is_pair]) for d in distances]
@@ -127,18 +131,17 @@ class MotionKernel:
         on_clock = normalise_time(scaled, self.n_frames)
         distances = [
             pairwise_distances(c, c.features(on_clock), known, name=f" by {c.cost}", **jobs)
-            for c, known in zip(self.comparisons, self._features, strict=True)
+            for c, known in zip(self._comparisons, self._features, strict=True)
         ]
-        if self.summaries:
-            distances += [
-                cdist((statistics - mean) / std, known, "sqeuclidean")
-                for statistics, (mean, std), known in zip(
-                    self._summarised(scaled, on_clock),
-                    self._scalings,
-                    self._summaries,
-                    strict=True,
-                )
-            ]
+        distances += [
+            cdist((statistics - mean) / std, known, "sqeuclidean")
+            for statistics, (mean, std), known in zip(
+                self._summarised(scaled, on_clock),
+                self._scalings,
+                self._summaries,
+                strict=True,
+            )
+        ]
         return self._combined(self._as_views(distances))
 
     def _scale(self, trials):
@@ -157,18 +160,11 @@ class MotionKernel:
         ]
 
     def _as_views(self, distances):
-        """The mean kernel of each view: (n_views, n, n_landmarks)."""
-        kernels = [
-            np.exp(-self.gamma * d / median)
-            for d, median in zip(distances, self._medians, strict=True)
-        ]
-        return np.stack(
-            [
-                sum(k for k, view in zip(kernels, self._views, strict=True) if view == v)
-                / np.sum(self._views == v)
-                for v in range(self._views.max() + 1)
-            ]
+        """The mean kernel of each view: (4, n, n_landmarks)."""
+        velocity, elastic, pose, summaries, extremes, shares = (
+            np.exp(-d / median) for d, median in zip(distances, self._medians, strict=True)
         )
+        return np.stack([(velocity + elastic) / 2, pose, summaries, (extremes + shares) / 2])
 
     def _combined(self, views):
         weighted = [weight * view for weight, view in zip(self.weights, views, strict=True)]
@@ -399,22 +395,15 @@ def fold_gain(regression, kernel, codes, folds, decisions):
     return float(np.median(losses)) * (1 - 2 / len(numbers)) if losses else 0.0
 
 
-class Fitted(NamedTuple):
-    """A regression ``(A, b)``, its temperature, the largest held-out decision values (n,), and
-    what they gain from the last fold.
-    """
-
-    regression: tuple
-    temperature: float
-    held_out: np.ndarray
-    gain: float
-
-
 def fit_regression(C, folds, landmarks, kernel, codes):
-    """Fit the regression, and others without one fold and without two."""
+    """Fit the regression, and others without one fold and without two.
+
+    Returns the regression ``(A, b)``, its temperature, the largest held-out decision values (n,),
+    and what they gain from the last fold.
+    """
     regression = KernelRegression(kernel, C, landmarks)
     decisions = held_out_decisions(regression, kernel, codes, folds)
     gain = fold_gain(regression, kernel, codes, folds, decisions)
     A, b = regression.fit(codes)
-    regression = np.ascontiguousarray(A.T).T, b
-    return Fitted(regression, fit_temperature(decisions, codes), decisions.max(axis=1), gain)
+    temperature = fit_temperature(decisions, codes)
+    return (np.ascontiguousarray(A.T).T, b), temperature, decisions.max(axis=1), gain

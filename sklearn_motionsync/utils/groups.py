@@ -160,26 +160,26 @@ def encode_classes(y, trials, estimator_name):
     return classes, codes
 
 
-def add_unknown_label(classes, label=None):
+def add_unknown_label(classes):
     """The classes and, behind them, the label of trials that belong to none of them.
+
+    That is "unknown" among text, -1 among numbers, NaT among dates and durations.
 
     Parameters
     ----------
     classes : ndarray, shape (n_classes,)
         As `encode_classes` returns them.
-    label : str, number or None, default=None
-        None is "unknown" among text, -1 among numbers, NaT among dates and durations.
 
     Returns
     -------
     ndarray, shape (n_classes + 1,)
-        In the dtype of the classes, or if that does not hold the label exactly, in one that holds
-        all: integers of 64 bits, floats of 64 bits, or objects.
+        Numbers in the dtype of the classes, or if that does not hold -1, in one that holds all:
+        integers of 64 bits, floats of 64 bits, or objects.
 
     Raises
     ------
     ValueError
-        If the label is one of the classes, or not of their type.
+        If the label is one of the classes.
 
     Examples
     --------
@@ -189,34 +189,21 @@ def add_unknown_label(classes, label=None):
     array([  3, 255,  -1])
     """
     if classes.dtype.kind in _DATES:
-        if label is not None:
-            raise ValueError(
-                f"unknown_label={label!r} must be None, as the classes are of dtype "
-                f"{classes.dtype}: rejected trials get NaT."
-            )
         return np.append(classes, np.array("NaT", classes.dtype))
     is_text = classes.dtype.kind in "UO"
-    if label is None:
-        label = "unknown" if is_text else -1
-    if isinstance(label, np.timedelta64) or is_text != isinstance(label, str):
+    label = "unknown" if is_text else -1
+    if label in classes.tolist():
         raise ValueError(
-            f"unknown_label={label!r} must be {'text' if is_text else 'a number'}, like the "
-            f"classes {classes.tolist()}."
+            f"{label!r} is one of the classes, and what trials are called that are rejected: give "
+            "the class another name, or set reject_below=None."
         )
-    if isinstance(label, np.generic):
-        label = label.item()
+    if is_text:
+        return np.append(classes, label)
     labels = [*classes.tolist(), label]
-    if label in labels[:-1]:
-        raise ValueError(
-            f"unknown_label={label!r} is one of the classes: choose another label for rejected "
-            "trials."
-        )
-    larger = [None] if is_text else [np.int64, np.uint64, np.float64]
-    for dtype in [classes.dtype, *larger]:
-        # What is too large for a dtype, and NaN among integers, are errors.
-        with np.errstate(over="ignore"), suppress(OverflowError, ValueError):
+    for dtype in (classes.dtype, np.int64, np.float64):
+        with suppress(OverflowError):
             held = np.array(labels, dtype)
-            if all(a == b or a != a != b for a, b in zip(held.tolist(), labels, strict=True)):
+            if held.tolist() == labels:
                 return held
     return np.array(labels, dtype=object)
 

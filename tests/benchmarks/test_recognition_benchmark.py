@@ -109,7 +109,7 @@ def test_benchmarked_pipeline_is_that_of_the_manual(recognition, bunch, recordin
 
 
 def test_all_tables_of_a_tiny_set_without_peers(recognition, recordings, capsys, monkeypatch):
-    hasty = partial(ActionClassifier, ["pose"], n_frames=12)
+    hasty = partial(ActionClassifier, n_frames=12)
     monkeypatch.setattr(recognition, "version_of", lambda package: None)
     monkeypatch.setattr(recognition, "ActionClassifier", hasty)
     splits = recognition.actors_left_out(recordings.actors)[:1]

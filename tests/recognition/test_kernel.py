@@ -119,26 +119,3 @@ def test_groups_take_the_weight_off_what_tells_people_apart():
     poses, summaries = classifier.weights_[1:3]
     assert classifier.weights_[[0, 3]].min() > 10 * max(poses, summaries)
     assert classifier.score(new, y[test]) == 1
-    alone = ActionClassifier("pose", n_frames=25, summaries=False)
-    alone.fit(known, y[train], groups=people[train])
-    np.testing.assert_array_equal(alone.weights_, [1])
-    assert alone.score(new, y[test]) < 1
-
-
-@pytest.mark.parametrize(
-    ("costs", "summaries", "n_views"),
-    [
-        (("velocity", "pose"), True, 4),
-        ("elastic", True, 3),
-        (("pose", "velocity"), False, 2),
-        ((), True, 2),
-    ],
-)
-def test_views_are_those_that_are_asked_for(costs, summaries, n_views):
-    X, y, people = exercises(16)
-    classifier = ActionClassifier(costs, n_frames=10, summaries=summaries)
-    weights = classifier.fit(X, y, groups=people).weights_
-    assert weights.shape == (n_views,)
-    if n_views == 2 and costs:
-        # Shape comes before poses, in whatever order the costs are named.
-        assert weights[0] > weights[1]

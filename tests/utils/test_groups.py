@@ -53,10 +53,10 @@ METHODS = {
     "ActionModel.partial_fit(groups)": (lambda g: ActionModel().partial_fit(X, groups=g), False),
     "ActionDetector.fit(groups)": (lambda g: ActionDetector(PIPE).fit(X, groups=g), True),
     "ActionClassifier.fit(groups)": (
-        lambda g: ActionClassifier([], n_frames=10).fit(X, [0, 1] * 3, groups=g),
+        lambda g: ActionClassifier(n_frames=10).fit(X, [0, 1] * 3, groups=g),
         True,
     ),
-    "ActionClassifier.fit(y)": (lambda y: ActionClassifier([], n_frames=10).fit(X, y), True),
+    "ActionClassifier.fit(y)": (lambda y: ActionClassifier(n_frames=10).fit(X, y), True),
     "MotionTracker.fit(groups)": (lambda g: MotionTracker(SYNC, 20).fit(X, groups=g), True),
     "PartSynchronizer.lags(groups)": (lambda g: PARTS.lags(X, groups=g), False),
     "compare_events(y)": (
