@@ -86,7 +86,9 @@ def ours(recordings, action, held_out):
     given = [recordings.takes[i] for i in takes]
     found = {}
     for threshold in ("auto", None):
-        _, locations = find_trials(pipe, given, threshold=threshold, coverage=0.8, max_hits=30)
+        _, locations = find_trials(pipe, given, threshold=threshold, coverage=0.8)
+        # The best ones of each take.
+        locations = locations.sort_values("score").groupby("take").tail(30)
         rows = locations[["take", "start", "stop", "score"]].to_numpy()
         found[threshold] = [(takes[int(t)], int(a), int(b), s) for t, a, b, s in rows]
     return found

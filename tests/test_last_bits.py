@@ -10,7 +10,7 @@ from sklearn_motionsync import ASpace, Match, to_trials
 from sklearn_motionsync.io import cut_at_events
 from sklearn_motionsync.live.members import weighted_median
 from sklearn_motionsync.synchronizers import blend_trials
-from sklearn_motionsync.takes import CycleSegmenter, find_trials
+from sklearn_motionsync.takes import CycleSegmenter
 
 SEEDS = range(2)
 
@@ -75,15 +75,6 @@ def test_cycles_are_counted_and_cut_alike(period, seed):
         tables.append(table[["start", "stop", "complete"]])
     pd.testing.assert_frame_equal(*tables)
     assert tables[0]["complete"].sum() >= 3
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_of_copies_of_an_action_the_first_is_found(seed):
-    action, rest = np.sin(np.linspace(0, np.pi, 40))[:, np.newaxis] ** 2, np.zeros((25, 1))
-    copy = action + 0.1 * action**3
-    take = np.concatenate([rest, copy, rest, copy, rest, copy, rest])
-    _, found = find_trials(action, shaken(take, seed), max_hits=1)
-    assert 20 <= found["start"].item() <= 30
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from bisect import bisect, insort
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -49,10 +49,6 @@ _CLOCK = 100
 _MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
 # Rates that differ by a larger ratio are mistakes.
 _MOST = 100
-# Rates of takes, as multiples of that of the pattern, that are tried where no rate is known and
-# nothing is found. Of 63 such takes of people at another rate 59 have hits at one of these, 56 at
-# the true one, and 10 of 115 takes without the action.
-_OTHER_RATES = (0.25, 0.5, 2.0, 4.0)
 # The shortest window, in frames.
 _SHORTEST = 3
 # The first step by which ends of a hit are moved, as a share of its length; later steps are halved.
@@ -70,7 +66,6 @@ _NO_SCORE = 1e-300
     {
         "threshold": [Interval(Real, 0, 1, closed="both"), StrOptions({"auto"}), None],
         "coverage": [Interval(Real, 0, 1, closed="neither")],
-        "max_hits": [Interval(Integral, 1, None, closed="left"), None],
         "pattern_rate": [FRAME_RATE, None],
         "verbose": ["verbose"],
     }
@@ -81,7 +76,6 @@ def find_trials(
     *,
     threshold: float | Literal["auto"] | None = "auto",
     coverage: float = 0.8,
-    max_hits: int | None = None,
     groups: Labels | None = None,
     frame_rate: float | ValuesLike | None = None,
     pattern_rate: float | None = None,
@@ -112,9 +106,7 @@ def find_trials(
         One take, or several. A take of a single feature may be one-dimensional. Takes of another
         frame rate than the training trials are resampled to theirs. Tables know their rate,
         by ``attrs["frame_rate"]`` or an index in seconds; for others give ``frame_rate`` and
-        ``pattern_rate``. If neither is known, both are taken to have the same; where then nothing
-        is found, a warning tells if there is something at half, twice, a quarter or four times the
-        rate.
+        ``pattern_rate``. If neither is known, both are taken to have the same.
     threshold : "auto", float or None, default="auto"
         The lowest score of a hit. ``"auto"``: learnt from the training trials, each compared
         with those of other groups, but not below what random movements among their poses rarely
@@ -124,8 +116,6 @@ def find_trials(
     coverage : float, default=0.8
         Share of trials of new subjects, cut out by hand, that the learnt threshold accepts,
         unless random movements score as high; less where many windows of a take do.
-    max_hits : int, default=None
-        How many hits are kept of each take, the best ones; by default all.
     groups : array-like, default=None
         Group of each training trial, such as its subject. By default the groups that an
         `ActionModel` in the pipeline was fitted with; it keeps those of at most 64 trials.
@@ -156,7 +146,7 @@ def find_trials(
     Warns
     -----
     UserWarning
-        If one frame rate only is known; or none, and nothing is found but at another one.
+        If one frame rate only is known.
 
     See Also
     --------
@@ -179,7 +169,7 @@ def find_trials(
     X = as_takes(X, univariate=True)
     checker = type("find_trials", (SequenceLevelMixin, BaseEstimator), {})()
     checked = check_input(checker, X, reset=True, level="sequence", facts=())
-    searched, paces, is_rate_known = _at_rate_of(pattern, X, checked, frame_rate, pattern_rate)
+    searched, paces = _at_rate_of(pattern, X, checked, frame_rate, pattern_rate)
     synchronizer, takes, codes = _reach(pattern, searched, groups)
     _check_lengths(checked if searched is X else searched, takes, checked.called)
     dissimilarity = WindowDissimilarity(synchronizer, codes)
@@ -188,12 +178,10 @@ def find_trials(
         hits = _search_takes(takes, propose, dissimilarity, threshold, coverage, progress)
     rows = []
     for i, (hits_of_take, level) in enumerate(hits):
-        best = best_hits(hits_of_take, 0.0 if threshold is None else level, max_hits)
+        best = [hit[:3] for hit in hits_of_take if threshold is None or hit.score >= level]
         rows += [(i, *hit, level) for hit in in_frames_given(best, paces[i], len(checked[i]))]
     types = {"take": int, "start": int, "stop": int, "score": float, "threshold": float}
     table = pd.DataFrame(rows, columns=list(types)).astype(types)
-    if threshold is not None and table.empty and not is_rate_known:
-        _warn_of_other_rates(pattern, X, threshold, coverage, groups)
     return cut_takes(X, checked, table)
 
 
@@ -230,8 +218,8 @@ def _search_takes(takes, propose, dissimilarity, threshold, coverage, progress):
 def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
     """Takes at the frame rate of the training set, ``X`` itself if none is resampled.
 
-    With the takes come the frames that were given in a frame that is searched, for each, and
-    whether any frame rate is known. ``checked`` are the takes of ``X``, checked.
+    With the takes come the frames that were given in a frame that is searched, for each.
+    ``checked`` are the takes of ``X``, checked.
     """
     rates = [facts.get("frame_rate") for facts in checked.facts] or [None] * len(checked)
     if frame_rate is not None:
@@ -255,9 +243,8 @@ def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
         1.0 if rate_of_pattern is None or rate is None else rate / rate_of_pattern for rate in rates
     ]
     paces = [1.0 if abs(pace - 1) <= SAME_RATE else pace for pace in paces]
-    is_known = rate_of_pattern is not None or any(rate is not None for rate in rates)
     if set(paces) == {1.0}:
-        return X, paces, is_known
+        return X, paces
     searched = list(as_collection(X))
     for i, pace in enumerate(paces):
         if not 1 / _MOST <= pace <= _MOST:
@@ -268,32 +255,7 @@ def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
             )
         if pace != 1:
             searched[i] = _resample(searched[i], checked[i], pace, rate_of_pattern)
-    return searched, paces, is_known
-
-
-def _warn_of_other_rates(pattern, X, threshold, coverage, groups):
-    """Warn if takes without hits would have some at another frame rate."""
-    counts = {}
-    for times in _OTHER_RATES:
-        _, locations = find_trials(
-            pattern,
-            X,
-            threshold=threshold,
-            coverage=coverage,
-            groups=groups,
-            frame_rate=times,
-            pattern_rate=1.0,
-        )
-        counts[times] = len(locations)
-    best = max(counts, key=counts.get)
-    if counts[best]:
-        warnings.warn(
-            "No window of the takes reaches the threshold. Their frame rate and that of the "
-            f"pattern are not known: at {best:g} times the pattern's rate "
-            f"{counts[best]} would. If they differ, give frame_rate and pattern_rate.",
-            UserWarning,
-            stacklevel=4,
-        )
+    return searched, paces
 
 
 def _frame_rate_of(pattern):
@@ -348,13 +310,6 @@ class Hit(NamedTuple):
     stop: int
     score: float
     proposed: float
-
-
-def best_hits(hits, threshold, count):
-    """Start, stop and score of the best hits that reach a threshold, in order of time."""
-    reaching = [hit for hit in hits if hit.score >= threshold]
-    reaching = [reaching[k] for k in _best_first([hit.score for hit in reaching])]
-    return sorted(hit[:3] for hit in reaching[:count])
 
 
 def _best_first(scores):

@@ -26,7 +26,6 @@ from sklearn_motionsync.takes import find_trials
 from sklearn_motionsync.takes.search import (
     Proposer,
     WindowSearch,
-    best_hits,
     in_frames_given,
 )
 from sklearn_motionsync.takes.windows import (
@@ -103,7 +102,8 @@ def test_pipeline_detector_and_synchronizer_find_the_same(pipe):
 def test_best_window_is_that_of_an_exhaustive_search():
     pattern, shortest, longest = movement(12), 8, 18
     take = take_of({15: movement(13)}, 45, noise=0.1)
-    _, locations = find_trials(pattern, take, threshold=None, max_hits=1)
+    _, locations = find_trials(pattern, take, threshold=None)
+    locations = locations.nlargest(1, "score")
     scores = {
         (start, start + n): np.exp(-brute_unlikeness(take[start : start + n], pattern))
         for n in range(shortest, longest + 1)
@@ -155,9 +155,9 @@ def search_of(scores, n_frames, shortest=1, longest=90):
     return WindowSearch(np.zeros((n_frames, 1)), dissimilarity, shortest, longest)
 
 
-def hits_of(scores, proposed, n_frames=60, threshold=0.5, count=None, **limits):
+def hits_of(scores, proposed, n_frames=60, threshold=0.5, **limits):
     found = search_of(scores, n_frames, **limits).hits(np.array(proposed), threshold**2)
-    return best_hits(found, threshold, count)
+    return [hit[:3] for hit in found if hit.score >= threshold]
 
 
 def test_hits_may_touch_each_other_and_the_ends_of_the_take():
@@ -165,7 +165,6 @@ def test_hits_may_touch_each_other_and_the_ends_of_the_take():
     expected = [(*window, pytest.approx(score)) for window, score in scores.items()]
     for order in ([0, 1, 2], [2, 0, 1], [1, 2, 0]):
         assert hits_of(scores, np.array(list(scores))[order]) == expected
-    assert hits_of(scores, list(scores), count=2) == expected[:2]
     assert hits_of(scores, list(scores), threshold=0.75) == expected[:2]
     # The second overlaps the first by a frame, so it is none.
     assert hits_of({(0, 21): 0.9, (20, 40): 0.8}, [(0, 21), (20, 40)])[1:] == []
@@ -260,7 +259,7 @@ def test_every_kind_of_collection_gives_equal_results(pipe):
     expected = find_trials(pipe, TAKE)[1]
     row = np.sin(np.linspace(0, 9, 50))
     take = np.concatenate([np.zeros(70), row, np.full(60, row[-1])])
-    assert spans(find_trials(row, take, max_hits=1)[1]) == [[70, 120]]
+    assert spans(find_trials(row, take)[1].nlargest(1, "score")) == [[70, 120]]
     locations = find_trials(pipe, np.stack([TAKE, TAKE]))[1]
     pd.testing.assert_frame_equal(locations[locations["take"] == 0], expected)
     assert len(locations) == 2 * len(expected)
@@ -382,14 +381,6 @@ def test_rates_may_be_given(pipe, at_30):
     assert len(found) == 3
 
 
-def test_warns_of_another_frame_rate_if_none_is_known_and_nothing_is_found(pipe):
-    take = table(TAKE, 120).to_numpy()
-    with pytest.warns(UserWarning, match=r"No window .* at 4 times the pattern's rate 3 would"):
-        assert find_trials(pipe, take)[0] == []
-    # What is known is not doubted.
-    assert find_trials(pipe, take, frame_rate=30, pattern_rate=30)[0] == []
-
-
 def test_rates_within_a_hundredth_are_one(at_30):
     take = table(TAKE, 30)
     expected = find_trials(at_30, take)[1]
@@ -416,15 +407,13 @@ def test_hits_in_frames_given_keep_order_and_limits():
 # -- threshold and number of hits ------------------------------------------------------------------
 
 
-def test_threshold_and_max_hits_select_hits(pipe):
+def test_threshold_selects_hits(pipe):
     locations = find_trials(pipe, TAKE, threshold=None)[1]
     assert len(locations) > 3
     lengths = [len(x) for x in TRAINING]
     sizes = locations["stop"] - locations["start"]
     assert sizes.between(min(lengths) / 1.1 - 1, np.ceil(max(lengths) * 1.1)).all()
     assert (locations["stop"].to_numpy()[:-1] <= locations["start"].to_numpy()[1:]).all()
-    best = find_trials(pipe, TAKE, threshold=None, max_hits=2)[1]
-    assert sorted(best["score"]) == sorted(locations["score"])[-2:]
     level = float(locations["score"].nlargest(2).min())
     assert len(find_trials(pipe, TAKE, threshold=level)[1]) == 2
 
@@ -579,7 +568,6 @@ def test_memory_does_not_grow_with_the_take(pipe):
         ({"threshold": 1.5}, "The 'threshold' parameter"),
         ({"threshold": "learned"}, "The 'threshold' parameter"),
         ({"coverage": 1}, "The 'coverage' parameter"),
-        ({"max_hits": 0}, "The 'max_hits' parameter"),
         ({"pattern_rate": 0}, "The 'pattern_rate' parameter"),
         ({"frame_rate": [30, 30]}, "frame_rate must be one number above 0"),
     ],
