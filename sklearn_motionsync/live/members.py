@@ -394,6 +394,8 @@ def _adjoint_step(process, frame, update, later):
 _MIN_EFFECTIVE = 0.5
 # One particle of so many begins elsewhere on the clock, for a take that begins in mid-movement.
 _ELSEWHERE = 10
+# Divides the log-likelihood of the velocities of every hundredth of the mean duration.
+_TEMPERING = 10.0
 # While the phase is lost, particles are reinitialised after so many memories of the NIS.
 _RETRY = 3.0
 
@@ -515,7 +517,7 @@ class ParticleFilter:
         distances = squared_norms(slopes @ whitening(covariance).T)
         # Evidence is weighted by its duration, so that the frame rate does not matter.
         share = 100 * min(dt, clock.window) / clock.duration
-        self.particles = self.particles.reweight(-0.5 * share / model.tempering * distances)
+        self.particles = self.particles.reweight(-0.5 * share / _TEMPERING * distances)
         return self._shrink_nis(self.particles.weights @ distances / len(rows), len(rows))
 
     def _shrink_nis(self, nis, n):

@@ -60,7 +60,6 @@ class TrackerModel(NamedTuple):
         The NIS of a single frame beyond which it is ignored.
     noise : ndarray, shape (n_features, n_features)
         Covariance of the noise of a whole observed pose.
-    tempering : float
     n_particles : int
     """
 
@@ -74,11 +73,10 @@ class TrackerModel(NamedTuple):
     nis_limits: np.ndarray
     gate: float
     noise: np.ndarray
-    tempering: float
     n_particles: int
 
     @classmethod
-    def learn(cls, warped, rates, groups, clock, noise, tempering, n_particles):
+    def learn(cls, warped, rates, groups, clock, noise, n_particles):
         """Learn from at least two synchronised trials (n, P, n_features), of at least two groups.
 
         ``rates`` (n, P) are those along the clock, and groups are counted from 0. The other
@@ -112,7 +110,6 @@ class TrackerModel(NamedTuple):
             1 + np.array(excess),
             gate,
             noise,
-            tempering,
             n_particles,
         )
 

@@ -52,7 +52,8 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
        particles share one Kalman gain.
     4. The weights are likelihoods of causal velocities, compared with those of the mean along the
        path of the particle. The style of a person persists, so frames are not independent:
-       log-likelihoods of poses are not used, and those of velocities are divided by ``tempering``.
+       log-likelihoods of poses are not used, and those of the velocities of every hundredth of the
+       mean duration are divided by 10.
     5. A second Kalman filter knows no phase: deviations are those from the mean of all frames. Both
        estimates are multiplied as densities, each to the power of its weight. The weights are 3 to
        1, divided by the mean variance of each estimate. The covariance of either is larger by its
@@ -72,8 +73,6 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         one of direction cosines. ``JointNoise(0.02, cosines)`` is that of joint positions, 2 cm
         for metres, which shows more in short limbs; with a ``projection`` it is 0.02 for each
         number.
-    tempering : float, default=10.0
-        Divides the log-likelihood of the velocities of every hundredth of the mean duration.
     frame_rate : float, default=None
         Frames a second of the training trials. Times are then in seconds; without it
         in frames of the training trials.
@@ -162,7 +161,6 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         "synchronizer": [HasMethods(["fit", "match"]), None],
         "n_particles": [Interval(Integral, 1, None, closed="left")],
         "noise": [Interval(Real, 0, LARGEST, closed="right"), JointNoise],
-        "tempering": [Interval(Real, 0, None, closed="neither")],
         "frame_rate": [FRAME_RATE, None],
         "random_state": ["random_state"],
     }
@@ -174,14 +172,12 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         synchronizer: BaseEstimator | None = None,
         n_particles: int = 500,
         noise: float | JointNoise = 0.05,
-        tempering: float = 10.0,
         frame_rate: float | None = None,
         random_state: RandomState = 0,
     ) -> None:
         self.synchronizer = synchronizer
         self.n_particles = n_particles
         self.noise = noise
-        self.tempering = tempering
         self.frame_rate = frame_rate
         self.random_state = random_state
 
@@ -231,9 +227,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
             noise = self._noise_of(warped.mean(axis=0))
             step = progress.stage("learning how people vary", 1)
             with one_blas_thread():
-                model = TrackerModel.learn(
-                    warped, rates, codes, clock, noise, self.tempering, self.n_particles
-                )
+                model = TrackerModel.learn(warped, rates, codes, clock, noise, self.n_particles)
             step()
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         self.synchronizer_, self.n_frames_ = sync, int(sync.n_frames_)

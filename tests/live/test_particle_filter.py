@@ -53,7 +53,7 @@ def model(fitted):
     """What it has learnt, of one particle."""
     warped, clock = np.stack(fitted.synchronizer_.transform(make_training(6))), Clock(24.0, 24.0)
     assert (fitted.n_frames_, fitted.duration_) == (25, 24)
-    return TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, noise_of(0.1), 10.0, 1)
+    return TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, noise_of(0.1), 1)
 
 
 def sample_body(tracker, times, rng):
@@ -229,7 +229,7 @@ def test_limits_of_the_nis_equal_their_definition(outlier, duration):
     if outlier:
         warped[2, 10:16] += [5, 0, -5]
     clock, step, R = Clock(24.0, duration), duration / 24, noise_of(noise)
-    model = TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, R, 10.0, 50)
+    model = TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, R, 50)
     deviations = (warped - warped.mean(axis=0)) * 6 / 5
     window, times = max(0.03 * duration, 1.0), step * np.arange(25)
     slopes, noises = np.empty((6, 24, width)), []
@@ -279,7 +279,7 @@ def test_estimates_are_those_of_the_weighted_particles():
         np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25))),
     )
     given = np.stack(make_training(6)), rates, np.arange(6), clock
-    model = TrackerModel.learn(*given, noise_of(0.1), 1.0, 60)
+    model = TrackerModel.learn(*given, noise_of(0.1), 60)
     running, mean = RunningTake(model, 3, 0.0, 3), given[0].mean(axis=0)
     for p in range(25):
         track = running.step(given[0][2, p], float(p), Observer(np.eye(3), noise_of(0.1)))
@@ -349,7 +349,7 @@ def test_weights_and_nis_equal_their_definitions(rows):
         np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25))),
     )
     given = np.stack(make_training(6)), rates, np.arange(6), clock
-    model, matrix = TrackerModel.learn(*given, noise_of(0.1), 2.0, 60), np.eye(3)[rows]
+    model, matrix = TrackerModel.learn(*given, noise_of(0.1), 60), np.eye(3)[rows]
     running, all_seen = ParticleFilter(model, 3, 0.0, len(rows)), np.ones(len(rows), dtype=bool)
     nis, n, share = np.ones(2), len(rows), min(np.sqrt(len(rows) / 3), 1)
     noise, frames = 0.01 * np.eye(n), np.arange(25)
@@ -363,7 +363,7 @@ def test_weights_and_nis_equal_their_definitions(rows):
             known = matrix @ model.velocities @ matrix.T + 0.01 * np.diag(variances)
             distances = np.einsum("ni,ij,nj->n", slopes, np.linalg.inv(known), slopes)
             old = before.weights if before.effective_size >= 30 else np.full(60, 1 / 60)
-            weights = old * np.exp(-0.5 * 100 * min(dt, 1.44) / 48 / 2 * distances)
+            weights = old * np.exp(-0.5 * 100 * min(dt, 1.44) / 48 / 10 * distances)
             np.testing.assert_allclose(now.weights, weights / weights.sum(), rtol=1e-6)
         expected = np.column_stack([np.interp(now.phases, frames, m) for m in model.mean.T])
         # Poses are judged before the weights change.
