@@ -30,7 +30,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import load_trials, make_bending
 from sklearn_motionsync.display import ActionModelDisplay, SkeletonDisplay, SynchronizationDisplay
-from sklearn_motionsync.metrics import keyframe_error, sobolev_least_squares
+from sklearn_motionsync.metrics import keyframe_error
 
 parser = argparse.ArgumentParser(
     description="Align and model trials of an action.", allow_abbrev=False
@@ -157,7 +157,6 @@ def accepted():
 
 linear = LinearSynchronizer(n_frames=100).fit(points)
 stretched = linear.transform(points)
-calmer = sobolev_least_squares(stretched, synchronised)
 median = dense.pattern_index_
 order = np.argsort(dense.global_distances_)
 margin = dense.global_distances_[order[1]] / dense.global_distances_[order[0]] - 1
@@ -176,7 +175,6 @@ rows = [
     ("spread before", f"{spread(points):.3f}", "-"),
     ("spread, linear", f"{spread(stretched):.3f}", "-"),
     ("spread, dense", f"{spread(synchronised):.3f}", "-"),
-    ("spread of velocity, dense", f"{calmer:.0%} of linear", "-"),
 ]
 if "keyframes" in bunch:
     rows += [

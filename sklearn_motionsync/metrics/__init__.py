@@ -2,7 +2,7 @@
 
 from .measures import group_timing_error, keyframe_error
 from .scorers import FeatureHoldoutScorer, SpreadScorer
-from .spread import amplitude_phase_variance, least_squares, sobolev_least_squares
+from .spread import amplitude_phase_variance, least_squares
 
 __all__ = [
     "FeatureHoldoutScorer",
@@ -11,5 +11,4 @@ __all__ = [
     "group_timing_error",
     "keyframe_error",
     "least_squares",
-    "sobolev_least_squares",
 ]

@@ -17,7 +17,6 @@ from ..inputs.types import TrialsLike
 __all__ = [
     "amplitude_phase_variance",
     "least_squares",
-    "sobolev_least_squares",
 ]
 
 
@@ -65,48 +64,13 @@ def least_squares(before: TrialsLike, after: TrialsLike) -> float:
     old, new = (_squared_norms(_from_others(z)) for z in (x, y))
     counts = old > x.shape[2] * tolerance**2
     if not counts.any():
-        is_same = (new <= y.shape[2] * tolerance_after**2).all()
-        return _without_spread_before(is_same, "identical")
+        if (new <= y.shape[2] * tolerance_after**2).all():
+            return 1.0
+        raise ValueError(
+            "The trials are identical before and are not after: the ratio is not defined. "
+            "Compare with trials that differ, such as normalize(X) of a synchronizer."
+        )
     return float(np.mean(new[counts] / old[counts]))
-
-
-def sobolev_least_squares(before: TrialsLike, after: TrialsLike) -> float:
-    """Ratio of squared differences of velocities after and before; 1 for no gain.
-
-    ``sum_i int |y_i' - mean_j y_j'|^2 dt / sum_i int |x_i' - mean_j x_j'|^2 dt``
-
-    Parameters
-    ----------
-    before, after : array-like, shape (n_sequences, P, n_features)
-        On one clock, linearly normalised and synchronised, in one unit. NaN is what was hidden:
-        it is left out.
-
-    Returns
-    -------
-    float
-        The ratio of squares: 0.25 where all differences are halved. 1 if all velocities were
-        identical before and are after.
-
-    Raises
-    ------
-    ValueError
-        If they are not of one shape, infinite, or all NaN; or velocities that were identical
-        before are not after.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sklearn_motionsync.metrics import sobolev_least_squares
-    >>> x = np.stack([np.zeros((3, 1)), np.arange(3.0)[:, None]])
-    >>> sobolev_least_squares(x, x + 5)
-    1.0
-    """
-    (x, tolerance), (y, tolerance_after) = _check_pair(before, after)
-    old, new = (_squared_norms(_from_others(np.gradient(z, axis=1))).sum() for z in (x, y))
-    if old <= len(x) * x.shape[2] * tolerance**2:
-        is_same = new <= len(y) * y.shape[2] * tolerance_after**2
-        return _without_spread_before(is_same, "of identical velocity")
-    return float(new / old)
 
 
 class AmplitudePhase(NamedTuple):
@@ -281,16 +245,6 @@ def _from_others(z):
     )
     compared = (~hidden & (n_others > 0)).mean(axis=(1, 2), keepdims=True)
     return differences / np.sqrt(np.where(compared > 0, compared, 1))
-
-
-def _without_spread_before(none_after, what):
-    """1, for no gain, if there is no spread before and after."""
-    if none_after:
-        return 1.0
-    raise ValueError(
-        f"The trials are {what} before and are not after: the ratio is not defined. "
-        "Compare with trials that differ, such as normalize(X) of a synchronizer."
-    )
 
 
 def _variance(z):

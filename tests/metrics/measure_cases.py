@@ -81,14 +81,6 @@ def spread_ratio(before, after):
     return np.mean(ratios)
 
 
-def velocity_ratio(before, after):
-    def total(z):
-        slopes = np.stack([np.gradient(x, axis=0) for x in z])
-        return sum(squared_distance(x, slopes.mean(axis=0)) for x in slopes)
-
-    return total(after) / total(before)
-
-
 def decomposition(before, after):
     """The formulas of Kneip and Ramsay, curve by curve and feature by feature."""
 
@@ -197,7 +189,6 @@ CASES = {
         + refusals(WRONG_KEYFRAMES, lambda k: (FIVE, *k)),
     ),
     "least_squares": Case(CURVES, spread_ratio, CURVE_REFUSALS),
-    "sobolev_least_squares": Case(CURVES, velocity_ratio, CURVE_REFUSALS[:1]),
     "amplitude_phase_variance": Case(
         CURVES,
         decomposition,
