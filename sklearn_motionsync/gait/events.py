@@ -157,7 +157,14 @@ def events_of(walk: Walk, known=None):
         side: [(k, is_end) for k, is_end in _farthest(walk, side, points, -1) if not is_end]
         for side, points in (walk.heels | walk.toes).items()
     }
-    running = _is_running(walk, strikes, behind)
+    # The toes of a runner are farthest behind about when the other foot strikes; a walker's, later.
+    late = []
+    for side, extremes in behind.items():
+        other_strikes = np.array([k for other, at in strikes.items() if other != side for k in at])
+        if side in walk.toes and len(other_strikes):
+            late += [k - other_strikes[np.abs(other_strikes - k).argmin()] for k, _ in extremes]
+    late = [k for k in late if abs(k) < _OTHER_STRIKE * walk.rate]
+    running = bool(late) and np.median(late) < _RUNNING * walk.rate
     events = [(FOOT_STRIKE, side, k) for side, at in strikes.items() for k in at]
     events += [
         (FOOT_OFF, side, k)
@@ -193,17 +200,6 @@ def _strikes(walk, side):
         peak = _DelayedPeak(walk, side, rise, ahead, _STRIKE, doubt)
     at = [peak.after(k, is_end) for k, is_end in ahead]
     return [float(k) for k in at if k is not None and _is_seen(heel, k)]
-
-
-def _is_running(walk, strikes, behind):
-    """Whether the toes are farthest behind about when the other foot strikes; a walker's, later."""
-    late = []
-    for side, extremes in behind.items():
-        other_strikes = np.array([k for other, at in strikes.items() if other != side for k in at])
-        if side in walk.toes and len(other_strikes):
-            late += [k - other_strikes[np.abs(other_strikes - k).argmin()] for k, _ in extremes]
-    late = [k for k in late if abs(k) < _OTHER_STRIKE * walk.rate]
-    return bool(late) and np.median(late) < _RUNNING * walk.rate
 
 
 def _offs(walk, side, behind, running):
@@ -249,7 +245,12 @@ class _DelayedPeak:
         self._variance = noise * noise * walk.per_frame / rate
         inner = [k for k, is_end in extremes if not is_end]
         lags = np.arange(whole(expected.first * rate), whole(expected.last * rate) + 1)
-        mean, many = _mean_around(curve, inner, lags), max(len(inner), 1)
+        mean, many = np.full(len(lags), np.nan), max(len(inner), 1)
+        if inner:
+            index = np.round(np.asarray(inner)[:, np.newaxis]).astype(np.intp) + lags
+            inside = (index >= 0) & (index < len(curve))
+            around = np.where(inside, curve[np.clip(index, 0, len(curve) - 1)], np.nan)
+            mean = nanmean(around, axis=0)
         height = np.sqrt(self._variance / many * _SECOND / _ACCELERATION**5)
         off = (lags / rate - expected.usual) / expected.spread
         peak = _peak(mean - height / 2 * np.square(off), mean)
@@ -320,16 +321,6 @@ def _farthest(walk, side, points, sign):
             if steps and (is_first or not is_end):
                 out.append((piece.start + (k if is_end else _between(stretch, k)), is_end))
     return out
-
-
-def _mean_around(values, at, lags):
-    """The mean of values at lags from some samples; NaN where none is known."""
-    if not len(at):
-        return np.full(len(lags), np.nan)
-    index = np.round(np.asarray(at)[:, np.newaxis]).astype(np.intp) + lags
-    inside = (index >= 0) & (index < len(values))
-    values_around = np.where(inside, values[np.clip(index, 0, len(values) - 1)], np.nan)
-    return nanmean(values_around, axis=0)
 
 
 def _peak(values, curve=None):

@@ -137,19 +137,15 @@ def _parameters(walk, events, leg, unit):
         scale = leg if name in _LENGTHS else 1.0
         by_side = values.get(name, {s: [] for s in SIDES})
         left, right = (scale * np.array(by_side[side]) for side in SIDES)
-        rows.append([name, of, *_summary(left, right)])
+        both = np.concatenate([left, right])
+        means = [float(x.mean()) if len(x) else np.nan for x in (left, right)]
+        middle = sum(means) / 2
+        asymmetry = 100 * (means[0] - means[1]) / middle if middle else np.nan
+        mean = float(both.mean()) if len(both) else np.nan
+        sd = float(both.std(ddof=1)) if len(both) > 1 else np.nan
+        rows.append([name, of, *means, mean, sd, len(both), asymmetry])
     columns = ["parameter", "unit", "left", "right", "mean", "sd", "n", "asymmetry"]
     return pd.DataFrame(rows, columns=columns)
-
-
-def _summary(left, right):
-    """Means of both sides, mean, standard deviation and number of all, and the asymmetry."""
-    both = np.concatenate([left, right])
-    means = [float(x.mean()) if len(x) else np.nan for x in (left, right)]
-    middle = sum(means) / 2
-    asymmetry = 100 * (means[0] - means[1]) / middle if middle else np.nan
-    sd = float(both.std(ddof=1)) if len(both) > 1 else np.nan
-    return [*means, float(both.mean()) if len(both) else np.nan, sd, len(both), asymmetry]
 
 
 def _of_side(walk, at, side, other, belt):

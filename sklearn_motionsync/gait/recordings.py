@@ -78,7 +78,14 @@ class Recordings:
         facts = TrialFacts.of(self._recordings, frame_rate)
         self._labels, self.levels = facts.labels, list(facts.levels[:-1])
         self._rates = facts.known_rates().tolist()
-        self._check_rates()
+        slowest, fastest = _RATES
+        for i, rate in enumerate(self._rates):
+            if not slowest <= rate <= fastest:
+                raise ValueError(
+                    f"{self.called(i)} has a frame rate of {rate:g}; recordings of people have "
+                    f"{slowest:g} to {fastest:g} frames a second. Give frame_rate= in frames a "
+                    "second, not the time between frames."
+                )
         # Arrays say nothing of their unit.
         self._units = [known.get("units") for known in self._checked.facts] or [None] * len(self)
 
@@ -174,16 +181,6 @@ class Recordings:
         keys = index_of(self._labels, self.levels).repeat([len(table) for table in tables])
         labels = keys.to_frame(index=False)
         return pd.concat([labels, pd.concat(tables, ignore_index=True)], axis=1)
-
-    def _check_rates(self):
-        slowest, fastest = _RATES
-        for i, rate in enumerate(self._rates):
-            if not slowest <= rate <= fastest:
-                raise ValueError(
-                    f"{self.called(i)} has a frame rate of {rate:g}; recordings of people have "
-                    f"{slowest:g} to {fastest:g} frames a second. Give frame_rate= in frames a "
-                    "second, not the time between frames."
-                )
 
 
 # -- the feet of a recording, heels and toes beside the pelvis ----------------------------------
@@ -291,7 +288,13 @@ class Walk:
                 f"{called}: no heel and no ankle is seen. Name them: "
                 "feet={'left_heel': 'LHEE', ...}."
             )
-        self.pelvis = self._resample(_pelvis(skeleton, called))
+        places = [k for k in ("pelvis", "left_hip", "right_hip") if k in skeleton.landmarks]
+        if not places:
+            raise ValueError(
+                f"{called}: the skeleton has no pelvis and no hip. Name one: "
+                "Skeleton(..., landmarks={'pelvis': ..., ...})."
+            )
+        self.pelvis = self._resample(skeleton.indices_of(places[0]))
         lowest = np.min([heel[:, 1] for heel in self.heels.values()], axis=0)
         heights = self.pelvis[:, 1] - lowest
         heights = heights[~np.isnan(heights)]
@@ -407,17 +410,6 @@ class Walk:
         filled = smooth(filled[np.newaxis], _HEADING * self.rate)[0]
         size = np.linalg.norm(filled, axis=1, keepdims=True)
         return filled / np.where(size > 0, size, 1)
-
-
-def _pelvis(skeleton, called):
-    """The joints whose mean is the pelvis, or the hips that there are."""
-    known = [name for name in ("pelvis", "left_hip", "right_hip") if name in skeleton.landmarks]
-    if not known:
-        raise ValueError(
-            f"{called}: the skeleton has no pelvis and no hip. Name one: "
-            "Skeleton(..., landmarks={'pelvis': ..., ...})."
-        )
-    return skeleton.indices_of(known[0])
 
 
 def pieces(x):

@@ -61,14 +61,33 @@ def group_timing_error(
     0.0666...
     """
     times = _as_warps(times)
-    moments = _as_moments(moments, len(times))
-    last = times.shape[1] - 1
-    shown = np.stack(
-        [
-            np.interp(tau * (len(phi) - 1) / last, np.arange(len(phi)), phi)
-            for tau, phi in zip(times, moments, strict=True)
-        ]
-    )
+    rows = _as_rows(moments, "moments")
+    if len(rows) != len(times):
+        raise ValueError(
+            f"Got {counted(len(times), 'warp')} and {counted(len(rows), 'set')} of moments."
+        )
+    last, shown = times.shape[1] - 1, np.empty(times.shape)
+    for i, (tau, phi) in enumerate(zip(times, rows, strict=True)):
+        if phi.ndim != 1 or len(phi) < 2:
+            raise ValueError(
+                f"Trial {i}: moments must have shape (n_frames,), one a frame of the "
+                f"trial and at least 2, got {phi.shape}."
+            )
+        inside = _is_inside(phi, 1)
+        if not inside.all():
+            p = int(np.argmin(inside))
+            raise ValueError(
+                f"Trial {i}: moments are shares of the action, from 0 to 1, got {phi[p]:.10g}"
+                f" at frame {p}. For seconds give (t - t[0]) / (t[-1] - t[0])."
+            )
+        decreases = np.diff(phi) < -_ROUNDING
+        if decreases.any():
+            raise ValueError(
+                f"Trial {i}: moments must not decrease; they do after frame "
+                f"{int(np.argmax(decreases))}."
+            )
+        moments_of_frames = np.clip(phi, 0, 1)
+        shown[i] = np.interp(tau * (len(phi) - 1) / last, np.arange(len(phi)), moments_of_frames)
     return float(last * np.abs(shown - shown.mean(axis=0)).mean())
 
 
@@ -112,11 +131,39 @@ def keyframe_error(
     """
     times = _as_warps(times)
     n_sequences, P = times.shape
-    lengths = _as_lengths(n_frames, n_sequences)
-    keyframes, pattern_keyframes = _as_keyframes(keyframes, pattern_keyframes, lengths, P)
+    lengths = as_numbers(n_frames, "n_frames", dtype=np.float64)
+    if lengths.shape != (n_sequences,):
+        raise ValueError(
+            f"n_frames must be the lengths of the {counted(n_sequences, 'trial')}, such as "
+            f"[len(x) for x in X], got shape {lengths.shape}."
+        )
+    valid = (lengths >= 2) & (lengths == np.floor(lengths)) & np.isfinite(lengths)
+    if not valid.all():
+        i = int(np.argmin(valid))
+        raise ValueError(
+            f"Trial {i}: n_frames must be a whole number of at least 2, got {lengths[i]:.10g}."
+        )
+    pattern = as_numbers(pattern_keyframes, "pattern_keyframes", dtype=np.float64)
+    if pattern.ndim != 1 or len(pattern) < 1:
+        raise ValueError(
+            "pattern_keyframes must have shape (n_keyframes,), with at least one, got "
+            f"{pattern.shape}."
+        )
+    rows = _as_rows(keyframes, "keyframes")
+    if [row.shape for row in rows] != [pattern.shape] * n_sequences:
+        raise ValueError(
+            f"keyframes must have {counted(len(pattern), 'number')}, as pattern_keyframes, for "
+            f"each of the {counted(n_sequences, 'warp')}; got the shapes "
+            f"{[row.shape for row in rows]}."
+        )
+    pattern = _in_order(pattern, P - 1, "The pattern", "frames of the clock")
+    frames = []
+    for i, (row, length) in enumerate(zip(rows, lengths, strict=True)):
+        refuse_seconds(row, int(length), f"Trial {i}")
+        frames.append(_in_order(row, length - 1, f"Trial {i}", "its own frames"))
     frames_per_step = (lengths[:, np.newaxis] - 1) / (P - 1)
-    matched = evaluate_warps(times, np.tile(pattern_keyframes, (n_sequences, 1)))
-    return float(np.abs(matched - keyframes / frames_per_step).mean())
+    matched = evaluate_warps(times, np.tile(pattern, (n_sequences, 1)))
+    return float(np.abs(matched - np.stack(frames) / frames_per_step).mean())
 
 
 # -- checks of arguments ------------------------------------------------------------------
@@ -139,77 +186,6 @@ def _as_warps(times) -> np.ndarray:
             f"got {times[i, p]:.10g} at frame {p}."
         )
     return np.clip(times, 0, last)
-
-
-def _as_moments(moments, n_sequences) -> list[np.ndarray]:
-    """Shares of the action, one array (n_frames_i >= 2,) a warp, from 0 to 1, not decreasing."""
-    rows = _as_rows(moments, "moments")
-    if len(rows) != n_sequences:
-        raise ValueError(
-            f"Got {counted(n_sequences, 'warp')} and {counted(len(rows), 'set')} of moments."
-        )
-    for i, phi in enumerate(rows):
-        if phi.ndim != 1 or len(phi) < 2:
-            raise ValueError(
-                f"Trial {i}: moments must have shape (n_frames,), one a frame of the "
-                f"trial and at least 2, got {phi.shape}."
-            )
-        inside = _is_inside(phi, 1)
-        if not inside.all():
-            p = int(np.argmin(inside))
-            raise ValueError(
-                f"Trial {i}: moments are shares of the action, from 0 to 1, got {phi[p]:.10g}"
-                f" at frame {p}. For seconds give (t - t[0]) / (t[-1] - t[0])."
-            )
-        decreases = np.diff(phi) < -_ROUNDING
-        if decreases.any():
-            raise ValueError(
-                f"Trial {i}: moments must not decrease; they do after frame "
-                f"{int(np.argmax(decreases))}."
-            )
-    return [np.clip(phi, 0, 1) for phi in rows]
-
-
-def _as_lengths(n_frames, n_sequences):
-    """Lengths of trials as floats: whole numbers of at least 2, one a warp."""
-    lengths = as_numbers(n_frames, "n_frames", dtype=np.float64)
-    if lengths.shape != (n_sequences,):
-        raise ValueError(
-            f"n_frames must be the lengths of the {counted(n_sequences, 'trial')}, such as "
-            f"[len(x) for x in X], got shape {lengths.shape}."
-        )
-    valid = (lengths >= 2) & (lengths == np.floor(lengths)) & np.isfinite(lengths)
-    if not valid.all():
-        i = int(np.argmin(valid))
-        raise ValueError(
-            f"Trial {i}: n_frames must be a whole number of at least 2, got {lengths[i]:.10g}."
-        )
-    return lengths
-
-
-def _as_keyframes(keyframes, pattern_keyframes, lengths, n_frames):
-    """Key-frames (n_sequences, n_keyframes) of trials, and (n_keyframes,) of the pattern."""
-    pattern = as_numbers(pattern_keyframes, "pattern_keyframes", dtype=np.float64)
-    if pattern.ndim != 1 or len(pattern) < 1:
-        raise ValueError(
-            "pattern_keyframes must have shape (n_keyframes,), with at least one, got "
-            f"{pattern.shape}."
-        )
-    rows = _as_rows(keyframes, "keyframes")
-    if [row.shape for row in rows] != [pattern.shape] * len(lengths):
-        raise ValueError(
-            f"keyframes must have {counted(len(pattern), 'number')}, as pattern_keyframes, for "
-            f"each of the {counted(len(lengths), 'warp')}; got the shapes "
-            f"{[row.shape for row in rows]}."
-        )
-    pattern = _in_order(pattern, n_frames - 1, "The pattern", "frames of the clock")
-    for i, (row, length) in enumerate(zip(rows, lengths, strict=True)):
-        refuse_seconds(row, int(length), f"Trial {i}")
-    frames = [
-        _in_order(row, length - 1, f"Trial {i}", "its own frames")
-        for i, (row, length) in enumerate(zip(rows, lengths, strict=True))
-    ]
-    return np.stack(frames), pattern
 
 
 def _in_order(frames, last, whose, unit):

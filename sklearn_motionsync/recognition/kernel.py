@@ -105,7 +105,9 @@ class MotionKernel:
             if is_other.any():
                 d[is_other] = pairwise_distances(c, f[is_other], known, name=name, **jobs)
         rounding = _ROUNDING * max(1.0, np.abs(self._center).max() / self._unit)
-        self._change_units = _change_units(on_clock, rounding)
+        # Mean absolute changes (n_reaches, n_features), infinite if rounding.
+        sizes = np.mean([np.abs(changes_of(x)).mean(axis=1) for x in on_clock], axis=0)
+        self._change_units = np.where(sizes > rounding, sizes, np.inf)
         self._scalings, self._summaries = [], []
         for d, statistics in zip(
             distances[summaries_from:], self._summarised(scaled, on_clock), strict=True
@@ -218,12 +220,6 @@ def changes_of(x):
     )
 
 
-def _change_units(on_clock, rounding):
-    """Mean absolute changes (n_reaches, n_features) of trials; infinite if rounding."""
-    sizes = np.mean([np.abs(changes_of(x)).mean(axis=1) for x in on_clock], axis=0)
-    return np.where(sizes > rounding, sizes, np.inf)
-
-
 def change_extremes(changes):
     """Minima and maxima of changes (n_reaches, P, n_features), of every feature and reach."""
     return np.concatenate([changes.min(axis=1), changes.max(axis=1)], axis=None)
@@ -292,8 +288,11 @@ class KernelRegression:
         columns = np.flatnonzero(chosen[self.landmarks])
         # The features of each kernel: K = Z Z' of landmarks, f = Z w, and Z = K back of all.
         least = _ALL_ROUNDING if len(self.landmarks) == len(codes) else _LEAST
-        rows = self.landmarks[columns]
-        backs = [_inverse_root(k[np.ix_(rows, columns)], least) for k in self._kernels]
+        backs = []
+        for k in self._kernels:
+            values, vectors = eigh(k[np.ix_(self.landmarks[columns], columns)])
+            is_large = values > least * max(values[-1], 0)
+            backs.append(vectors[:, is_large] / np.sqrt(values[is_large]))
         known = self._kernels[:, chosen][:, :, columns]
         z = np.hstack([k @ back for k, back in zip(known, backs, strict=True)])
         # The same penalty, relative to the mean loss, as for all.
@@ -312,13 +311,6 @@ class KernelRegression:
         b = np.full(n_classes, -np.inf)
         b[model.classes_] = intercepts
         return A.reshape(-1, n_classes), b
-
-
-def _inverse_root(kernel, least):
-    """The inverse square root (n, n_kept) of a kernel (n, n), without its smallest eigenvalues."""
-    values, vectors = eigh(kernel)
-    is_large = values > least * max(values[-1], 0)
-    return vectors[:, is_large] / np.sqrt(values[is_large])
 
 
 def decision_values(kernel, A, b):

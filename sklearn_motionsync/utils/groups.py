@@ -148,7 +148,12 @@ def encode_classes(y, trials, estimator_name):
     # Of the input: an array of mixed types would be one of text.
     given = _check_labels(np.asarray(y, dtype=object).ravel(), "y")
     if column.dtype.kind not in _DATES:
-        _check_held(column, given)
+        for i, (held, label) in enumerate(zip(column.tolist(), given, strict=True)):
+            if held != label:
+                raise ValueError(
+                    f"y[{i}] is {label!r}, which is {held!r} in an array of dtype {column.dtype}: "
+                    "give labels of one type, such as text."
+                )
     assert_all_finite(column, input_name="y")
     check_classification_targets(column)
     classes, codes = np.unique(column, return_inverse=True)
@@ -233,16 +238,6 @@ def mean_of_others(values, codes):
 def group_counts(trials, codes):
     """How many trials of each group show each value: (n_groups, P, n_features)."""
     return sums_of_groups(~np.isnan(trials), codes)[0]
-
-
-def _check_held(column, labels):
-    """Refuse labels that an array of all of them does not hold exactly."""
-    for i, (held, label) in enumerate(zip(column.tolist(), labels, strict=True)):
-        if held != label:
-            raise ValueError(
-                f"y[{i}] is {label!r}, which is {held!r} in an array of dtype {column.dtype}: give "
-                "labels of one type, such as text."
-            )
 
 
 def _check_labels(labels, name):

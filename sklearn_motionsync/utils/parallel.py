@@ -115,15 +115,10 @@ def one_blas_thread():
     finally:
         with _blas_lock:
             _blas_contexts.discard(context)
-            if not _blas_contexts:
-                _restore_blas()
-
-
-def _restore_blas():
-    while _blas_limits:
-        _allow_any_thread()
-        _blas_limits.pop().restore_original_limits()
-        _allow_any_thread()
+            while _blas_limits and not _blas_contexts:
+                _allow_any_thread()
+                _blas_limits.pop().restore_original_limits()
+                _allow_any_thread()
 
 
 @functools.cache
