@@ -248,7 +248,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                     f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
                 )
             stretches = [(i, stretch) for i in cyclic for stretch in repeats[i].stretches]
-            sampled = [sampled_stretch(features[i], stretch) for i, stretch in stretches]
+            sampled = [SampledStretch(features[i], stretch) for i, stretch in stretches]
             phases = self._learn_phases(sampled, progress)
             pattern = average_cycle([t.values for t in sampled], phases)
             follow = [
@@ -258,7 +258,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             ]
             if 0 < len(follow) < len(stretches):
                 # The others show another movement.
-                stretches, sampled = ([x[k] for k in follow] for x in (stretches, sampled))
+                stretches = [stretches[k] for k in follow]
+                sampled = [sampled[k] for k in follow]
                 phases = self._learn_phases(sampled, progress)
             cyclic = sorted({i for i, _ in stretches})
             takes_of = [cyclic.index(i) for i, _ in stretches]
@@ -431,7 +432,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         for i in self._select_cyclic(takes, repeats):
             first = 0
             for number, stretch in enumerate(repeats[i].stretches):
-                sampled = sampled_stretch(features[i], stretch)
+                sampled = SampledStretch(features[i], stretch)
                 phases = align(self.pattern_, sampled)
                 if strikes is not None:
                     phases = move_to_events(sampled.times, phases, strikes[i])
@@ -467,7 +468,10 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             )[:, 0]
             for name, of_all in (curves or {}).items()
         }
-        if not cycles or (self.start is None and not _is_gait(cycles)):
+        # In gait the feet step, by their places ahead of the pelvis.
+        if not cycles or (
+            self.start is None and np.ptp(cycles[SIDES[0]] - cycles[SIDES[1]]) < LEAST_STEP
+        ):
             width = sampled[0].values.shape[1] // 2
             values = [take.values[:, :width] for take in sampled]
             mean = average_cycle(values, phases)
@@ -500,7 +504,15 @@ def correlate_takes(segmenter, collection, takes, step=None):
 
     The features are the directions of limbs if there is a skeleton, else those of the takes.
     """
-    limits = _check_period(segmenter.period)
+    limits = segmenter.period
+    if limits is not None:
+        limits = tuple(limits)
+        good = len(limits) == 2 and all(isinstance(n, Real) for n in limits)
+        if not (good and 2 <= limits[0] <= limits[1]):
+            raise ValueError(
+                "period must be two numbers of frames, the least, at least 2, and the largest, of "
+                f"a cycle; got {segmenter.period!r}."
+            )
     if segmenter.skeleton is not None:
         cosines = DirectionCosines(segmenter.skeleton).set_output(transform="default")
         takes = cosines.fit_transform(collection)
@@ -533,25 +545,6 @@ def as_learnt(segmenter, features, repeats):
     return summary_of(stretches) if stretches else repeats
 
 
-def sampled_stretch(features, stretch):
-    """A stretch of a take with features, ready to be matched."""
-    return SampledStretch(features, stretch.correlation.period, stretch.start, stretch.stop)
-
-
-def _check_period(period):
-    """The least and the largest number of frames of a cycle, or None."""
-    if period is None:
-        return None
-    pair = tuple(period)
-    good = len(pair) == 2 and all(isinstance(n, Real) for n in pair)
-    if not (good and 2 <= pair[0] <= pair[1]):
-        raise ValueError(
-            "period must be two numbers of frames, the least, at least 2, and the largest, of a "
-            f"cycle; got {period!r}."
-        )
-    return pair
-
-
 def compared_names(segmenter):
     """Names of the compared features."""
     if segmenter.skeleton is not None:
@@ -565,7 +558,13 @@ def start_curves(segmenter, X, features):
     They are lists by name, with one curve (n_frames_i,) a take; None where any feature will do.
     """
     start, skeleton = segmenter.start, segmenter.skeleton
-    has_feet = _has_feet(skeleton)
+    # Whether the skeleton shows how far each foot is ahead of the pelvis.
+    has_feet = (
+        skeleton is not None
+        and skeleton.n_dims == 3
+        and bool({"hip", "shoulder"} & set(skeleton.limbs))
+        and {"pelvis", "left_ankle", "right_ankle"} <= set(skeleton.landmarks)
+    )
     if start is None and not has_feet:
         return None
     start = STRIKES.get(start, start)
@@ -618,19 +617,6 @@ def _phase_of(start, strikes, sampled, phases):
     if not len(at):
         raise ValueError(f"No {start} is found where the takes repeat; look at gait_events(X).")
     return float(np.angle(np.exp(2j * np.pi * at).mean()) / (2 * np.pi))
-
-
-def _has_feet(skeleton):
-    """Whether a skeleton shows how far each foot is ahead of the pelvis."""
-    if skeleton is None or skeleton.n_dims == 2:
-        return False
-    shows_heading = bool({"hip", "shoulder"} & set(skeleton.limbs))
-    return shows_heading and {"pelvis", "left_ankle", "right_ankle"} <= set(skeleton.landmarks)
-
-
-def _is_gait(cycles):
-    """Whether the feet step in a mean cycle, by their places ahead of the pelvis."""
-    return np.ptp(cycles[SIDES[0]] - cycles[SIDES[1]]) >= LEAST_STEP
 
 
 def _warn_of_lengths(takes, table, periods):

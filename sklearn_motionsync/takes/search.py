@@ -203,9 +203,9 @@ def _search_takes(takes, propose, dissimilarity, threshold, coverage, progress):
     step, out = progress.stage("searching", len(takes)), []
     for take in takes:
         take = take.astype(np.float64, copy=False)
-        search = WindowSearch(take, dissimilarity, propose.shortest, propose.longest)
         lowest = 0.0 if threshold is None else hopeless
-        hits = search.hits(propose(take), lowest)
+        limits = propose.shortest, propose.longest
+        hits = search_windows(take, propose(take), dissimilarity, *limits, lowest)
         level = threshold
         if fixed is None:
             u = -np.log([hit.score for hit in hits if hit.proposed >= hopeless])
@@ -318,52 +318,38 @@ def _best_first(scores):
     return np.argsort(whole(dissimilarity / _EQUAL), kind="stable")
 
 
-class WindowSearch:
-    """The best windows of a take that do not overlap."""
+def search_windows(take, windows, dissimilarity, shortest, longest, lowest):
+    """A `Hit` of each of windows (n, 2) that overlaps no better one, in order of time.
 
-    def __init__(self, take, dissimilarity, shortest, longest):
-        self._take, self._dissimilarity = take, dissimilarity
-        self._shortest, self._longest = shortest, longest
-
-    def hits(self, windows, lowest):
-        """A `Hit` of each of windows (n, 2) that overlaps no better one, in order of time.
-
-        Windows whose score is below ``lowest`` are not refined. One that is refined excludes those
-        it overlaps, whatever the threshold is, so that this selects among hits and changes none.
-        """
-        scores = np.exp(-self._dissimilarity(self._take, windows))
-        order = _best_first(scores)
-        order = order[scores[order] >= lowest]
-        refined = []
-        for k in order:
-            limits = self._limits(windows[k], refined)
-            if limits is not None:
-                first, last = limits
-                insort(refined, self._refine(windows[k], scores[k], first, last))
-        return refined
-
-    def _limits(self, window, refined):
-        """The free interval about a window; None if it overlaps refined ones, sorted by time."""
+    Its ends are moved, by smaller and smaller steps, to the best score. Windows whose score is
+    below ``lowest`` are not refined. One that is refined excludes those it overlaps, whatever the
+    threshold is, so that this selects among hits and changes none.
+    """
+    scores = np.exp(-dissimilarity(take, windows))
+    refined = []
+    for k in _best_first(scores):
+        if scores[k] < lowest:
+            continue
+        window, score = windows[k], scores[k]
+        # The free interval about the window.
         at = bisect(refined, tuple(window))
-        before = refined[at - 1][1] if at else 0
-        after = refined[at][0] if at < len(refined) else len(self._take)
-        return (before, after) if before <= window[0] and window[1] <= after else None
-
-    def _refine(self, window, score, first, last):
-        """The window with its ends moved, by smaller and smaller steps, to the best score."""
-        window, move = np.asarray(window), max(1, int(_FIRST_MOVE * (window[1] - window[0])))
-        proposed = float(score)
+        first = refined[at - 1][1] if at else 0
+        last = refined[at][0] if at < len(refined) else len(take)
+        if not (first <= window[0] and window[1] <= last):
+            continue
+        move = max(1, int(_FIRST_MOVE * (window[1] - window[0])))
         while move:
             candidates = window + move * _MOVES
             sizes = candidates[:, 1] - candidates[:, 0]
             inside = (candidates[:, 0] >= first) & (candidates[:, 1] <= last)
-            candidates = candidates[inside & (sizes >= self._shortest) & (sizes <= self._longest)]
-            scores = np.exp(-self._dissimilarity(self._take, candidates))
-            if scores.max(initial=0) > score * (1 + _EQUAL):
-                window, score = candidates[first_largest(scores, _EQUAL * score)], scores.max()
+            candidates = candidates[inside & (sizes >= shortest) & (sizes <= longest)]
+            moved = np.exp(-dissimilarity(take, candidates))
+            if moved.max(initial=0) > score * (1 + _EQUAL):
+                window, score = candidates[first_largest(moved, _EQUAL * score)], moved.max()
             else:
                 move //= 2
-        return Hit(int(window[0]), int(window[1]), float(score), proposed)
+        insort(refined, Hit(int(window[0]), int(window[1]), float(score), float(scores[k])))
+    return refined
 
 
 def _reach(pattern, X, groups):

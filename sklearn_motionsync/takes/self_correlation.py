@@ -179,7 +179,10 @@ def correlate(x, limits=None):
         for order, y in enumerate(smoothed)
     )
     breadth, correlation = breadth_of(smoothed[0]), (pose + velocity) / 2
-    peaks = _find_peaks(correlation, pose)
+    # Maxima above 0 before which the correlation of poses falls below half their height.
+    inner, before, after = correlation[1:-1], correlation[:-2], correlation[2:]
+    peaks = np.flatnonzero((inner > before) & (inner >= after) & (inner > 0)) + 1
+    peaks = peaks[np.minimum.accumulate(pose)[peaks] < _FALL * correlation[peaks]]
     offsets, values = parabola_vertex(*(correlation[peaks + k] for k in (-1, 0, 1)))
     lags = peaks + offsets
     if limits is not None:
@@ -188,7 +191,11 @@ def correlate(x, limits=None):
     period, periods, strength, n_cycles = np.nan, np.empty(0), 0.0, 0.0
     if len(lags):
         required = required_strength(n_frames / lags, breadth, _THRESHOLD)
-        shown = _are_shown(n_frames, lags, values >= required)
+        # A take that holds a movement twice shows that it repeats; others count, too, unless one
+        # that is strong is far shorter.
+        strong = lags[values >= required]
+        far = lags > _FAR * (strong[0] if len(strong) else np.inf)
+        shown = (n_frames >= whole(2 * lags, "up")) | ~far
         first = int(np.argmax(values >= _NEAR * values[shown].max()))
         period, strength = float(lags[first]), float(values[first])
         n_cycles = n_frames / period
@@ -199,15 +206,6 @@ def correlate(x, limits=None):
     return SelfCorrelation(
         correlation, pose, velocity, peaks, period, strength, n_cycles, breadth, periods
     )
-
-
-def _are_shown(n_frames, lags, strong):
-    """Whether a take shows that the movement of a lag repeats: it holds it twice.
-
-    Others count, too, unless one that is strong is far shorter.
-    """
-    far = lags > _FAR * (lags[strong][0] if strong.any() else np.inf)
-    return (n_frames >= whole(2 * lags, "up")) | ~far
 
 
 def _distinct_periods(lags, values, period):
@@ -306,11 +304,3 @@ def _autocorrelation(x, n_lags, noise):
     out = np.zeros(n_lags)
     out[moves] = products[moves] / np.sqrt(of_early[moves] * of_late[moves])
     return np.clip(out, -1, 1)
-
-
-def _find_peaks(correlation, pose):
-    """Maxima above 0 before which the correlation of poses falls below half their height."""
-    inner, before, after = correlation[1:-1], correlation[:-2], correlation[2:]
-    peaks = np.flatnonzero((inner > before) & (inner >= after) & (inner > 0)) + 1
-    lowest = np.minimum.accumulate(pose)
-    return peaks[lowest[peaks] < _FALL * correlation[peaks]]

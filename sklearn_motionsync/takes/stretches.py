@@ -143,12 +143,17 @@ def _find_first(take, part, threshold):
     """The first proposal, in a part of a take, that is accepted; None without any."""
     tried = []
     for proposal in take.proposals(part):
-        if any(_are_same(proposal, other) for other in tried):
+        start, stop, lag, group = proposal
+        if any(
+            _ratio(lag, other_lag) < _SAME_LAG
+            and min(stop, last) - max(start, first)
+            > _SAME_PLACE * (max(stop, last) - min(start, first))
+            for first, last, other_lag in tried
+        ):
             continue
         if len(tried) == _TRIES:
             break
-        tried.append(proposal)
-        start, stop, _, group = proposal
+        tried.append((start, stop, lag))
         correlation = correlate(take.x[start:stop], take.limits)
         for _ in range(2):
             ends = (
@@ -169,13 +174,6 @@ def _find_first(take, part, threshold):
 
 def _ratio(one, other):
     return max(one, other) / min(one, other)
-
-
-def _are_same(one, other):
-    """Whether proposals are of about the same lag and place."""
-    together = min(one[1], other[1]) - max(one[0], other[0])
-    spanned = max(one[1], other[1]) - min(one[0], other[0])
-    return _ratio(one[2], other[2]) < _SAME_LAG and together > _SAME_PLACE * spanned
 
 
 class _Take:
@@ -350,10 +348,7 @@ class SampledStretch:
     ----------
     features : ndarray, shape (n_frames, n_features)
         Those of the take.
-    period : float
-        Mean number of frames of a cycle.
-    start, stop : int
-        The stretch; by default the whole take.
+    stretch : Stretch
 
     Attributes
     ----------
@@ -365,11 +360,11 @@ class SampledStretch:
         Phases at the mean pace, 0 at the first frame.
     """
 
-    def __init__(self, features, period, start=0, stop=None):
-        stop = len(features) if stop is None else stop
-        self._inside = slice(start, stop)
+    def __init__(self, features, stretch):
+        start, period = stretch.start, stretch.correlation.period
+        self._inside = slice(start, stretch.stop)
         inside = features[self._inside]
-        self.begins, self.ends = start > 0, stop < len(features)
+        self.begins, self.ends = start > 0, stretch.stop < len(features)
         last = len(inside) - 1
         n_samples = max(whole(last / period * PHASES), 1) + 1
         self.times = np.linspace(start, start + last, n_samples)
@@ -494,7 +489,12 @@ def locate_cycles(take, phases, pattern, incomplete):
     for within, inner, k, share in outer:
         if within and len(begins):
             first, last = sorted([begins[k], begins[k] + share])
-            if not _keeps_pace(pattern, take, phases, first, last):
+            velocities = slice(pattern.shape[1] // 2, None)
+            speed, expected = (
+                np.square(x[:, velocities]).sum()
+                for x in _between(pattern, take, phases, first, last)
+            )
+            if speed < _PACE**2 * expected:
                 begins, frames = begins[inner], frames[inner]
     ends = list(zip(begins, frames.tolist(), strict=True))
     if incomplete:
@@ -505,14 +505,6 @@ def locate_cycles(take, phases, pattern, incomplete):
             complete = {first, following} <= set(begins) and score >= FOLLOWS
             if complete or incomplete:
                 yield start, stop + 1, complete, score
-
-
-def _keeps_pace(pattern, take, phases, first, last):
-    """Whether a stretch moves about as fast as the pattern, from one phase to another."""
-    values, expected = _between(pattern, take, phases, first, last)
-    width = pattern.shape[1] // 2
-    speeds = [np.square(x[:, width:]).sum() for x in (values, expected)]
-    return speeds[0] >= _PACE**2 * speeds[1]
 
 
 def _between(pattern, take, phases, first, last):

@@ -102,7 +102,14 @@ class WindowDissimilarity:
         if not len(self.known):
             return _DEFAULT_THRESHOLD
         learnt = min(log_moments(self.known).upper_limit(coverage), _MAX_THRESHOLD)
-        return max(min(learnt, self._random_limit()), _MIN_THRESHOLD)
+        portions = even_slices(_N_RANDOM, _WINDOW_BATCH)
+        counts = [portion.stop - portion.start for portion in portions]
+        of_random = [
+            self._measure(movements, np.full(len(movements), self._typical_length))
+            for movements in random_movements(self._training, counts)
+        ]
+        limit = float(np.quantile(np.concatenate(of_random), _RANDOM_QUANTILE))
+        return max(min(learnt, limit), _MIN_THRESHOLD)
 
     def threshold_of_take(self, limit, hits, n_frames):
         """The threshold of a take: the limit, or a lower one where many windows are below it.
@@ -135,17 +142,6 @@ class WindowDissimilarity:
             positions = self._positions([take[start:stop] for start, stop in windows[rows]])
             out[rows] = self._measure(positions, windows[rows, 1] - windows[rows, 0])
         return out
-
-    def _random_limit(self):
-        """A low quantile of the dissimilarity of random movements."""
-        portions = even_slices(_N_RANDOM, _WINDOW_BATCH)
-        counts = [portion.stop - portion.start for portion in portions]
-        movements = random_movements(self._training, counts)
-        dissimilarities = [
-            self._measure(portion, np.full(len(portion), self._typical_length))
-            for portion in movements
-        ]
-        return float(np.quantile(np.concatenate(dissimilarities), _RANDOM_QUANTILE))
 
     def _positions(self, trials):
         """Trials at all positions, in the unit of the features, in double precision."""

@@ -1,5 +1,7 @@
 """CycleSegmenter: phases of takes that are known, errors, and the scikit-learn contract."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,7 +17,7 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import CycleDisplay
 from sklearn_motionsync.takes import CycleSegmenter
-from sklearn_motionsync.takes.stretches import SampledStretch, locate_cycles
+from sklearn_motionsync.takes.stretches import SampledStretch, Stretch, locate_cycles
 
 HIP = 0
 
@@ -133,10 +135,9 @@ def test_takes_of_other_frame_rates_are_cut_at_the_same_phase(gait, fitted):
 
 @pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_score_is_the_cosine_with_the_pattern(size):
-    take, pattern = (
-        SampledStretch(slowing_take()[0], 100),
-        np.random.default_rng(0).normal(size=(32, 6)),
-    )
+    features, pattern = slowing_take()[0], np.random.default_rng(0).normal(size=(32, 6))
+    correlation = SimpleNamespace(period=100)
+    take = SampledStretch(features, Stretch(0, len(features), correlation))
     take.values = size * pattern[np.arange(len(take.times)) % 32]
     phases = np.arange(len(take.times)) / 32
     rows = list(locate_cycles(take, phases, pattern, False))

@@ -25,8 +25,8 @@ from sklearn_motionsync.matching.warps import normalise
 from sklearn_motionsync.takes import find_trials
 from sklearn_motionsync.takes.search import (
     Proposer,
-    WindowSearch,
     in_frames_given,
+    search_windows,
 )
 from sklearn_motionsync.takes.windows import (
     WindowDissimilarity,
@@ -146,17 +146,14 @@ def test_windows_are_compared_at_no_more_than_a_hundred_positions():
     np.testing.assert_allclose(WindowDissimilarity(sync)(take, windows), expected, rtol=1e-9)
 
 
-def search_of(scores, n_frames, shortest=1, longest=90):
-    """A search of a take in which windows have these scores, by (start, stop), and others 0.01."""
+def hits_of(scores, proposed, n_frames=60, threshold=0.5, shortest=1, longest=90):
+    """Those of a take in which windows have these scores, by (start, stop), and others 0.01."""
 
     def dissimilarity(take, windows):
         return np.array([-np.log(scores.get(tuple(w), 0.01)) for w in windows.tolist()])
 
-    return WindowSearch(np.zeros((n_frames, 1)), dissimilarity, shortest, longest)
-
-
-def hits_of(scores, proposed, n_frames=60, threshold=0.5, **limits):
-    found = search_of(scores, n_frames, **limits).hits(np.array(proposed), threshold**2)
+    take, windows = np.zeros((n_frames, 1)), np.array(proposed)
+    found = search_windows(take, windows, dissimilarity, shortest, longest, threshold**2)
     return [hit[:3] for hit in found if hit.score >= threshold]
 
 
