@@ -165,7 +165,14 @@ class CausalTrellis:
         for streams, parts in (partial or {}).items():
             by_stream[:, :, streams] = self._costs_of_part(parts, len(streams), high)
         if p > 0:
-            self._lead_in(p)
+            # Fill the cells before the first position, from which steps lead to row p.
+            first, before = self.trellis.centre, self._last_row()
+            if self._cyclic:
+                pad = self.trellis.pad
+                self._rows(self._states, p - 1)[first - pad : first] = before[-1 - pad : -1]
+            elif self._restart_cost < np.inf:
+                entry = first - self.trellis.table.subframes
+                self._rows(self._others, p - 1)[entry] = before.min(axis=0) + self._restart_cost
             tile.take_row(self._states, p, local, 0, high)
         if self._restart_cost < np.inf and p > 0:
             tile.take_row(self._others, p, local, 0, high)
@@ -178,7 +185,12 @@ class CausalTrellis:
             row = self._last_row()
             row[[0, -1]] = np.minimum(row[0], row[-1])
         if self.n_samples % REBASED == 0:
-            self._rebase()
+            # Count costs from the least of the last sample on.
+            least = self._last_row().min(axis=0)
+            for states in (self._states, self._others):
+                self._inside(states, self.n_samples - 1)[:] -= least
+            self._passed += least
+            self._energy[:] = self._least_energy
 
     @property
     def costs(self):
@@ -217,16 +229,6 @@ class CausalTrellis:
         self._passed[begins] = self.attempts[begins] = 0
         begins[:] = False
 
-    def _lead_in(self, p):
-        """Fill the cells before the first position, from which steps lead to row p."""
-        first, before = self.trellis.centre, self._last_row()
-        if self._cyclic:
-            pad = self.trellis.pad
-            self._rows(self._states, p - 1)[first - pad : first] = before[-1 - pad : -1]
-        elif self._restart_cost < np.inf:
-            entry = first - self.trellis.table.subframes
-            self._rows(self._others, p - 1)[entry] = before.min(axis=0) + self._restart_cost
-
     def _compare_attempts(self, p, moves):
         """Go on with the other attempt of a stream where it is cheaper in row p."""
         now, others = (self._inside(states, p) for states in (self._states, self._others))
@@ -238,15 +240,6 @@ class CausalTrellis:
         if wins.any():
             now[:, wins], others[:, wins] = others[:, wins], np.inf
             self.attempts += wins
-
-    def _rebase(self):
-        """Count costs from the least of the last sample on."""
-        row = self._last_row()
-        least = row.min(axis=0)
-        for states in (self._states, self._others):
-            self._inside(states, self.n_samples - 1)[:] -= least
-        self._passed += least
-        self._energy[:] = self._least_energy
 
     def _left(self, samples):
         return Bases(self.trellis, samples[:, np.newaxis]).by_group()[0]

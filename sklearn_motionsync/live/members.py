@@ -394,6 +394,8 @@ def _adjoint_step(process, frame, update, later):
 _MIN_EFFECTIVE = 0.5
 # One particle of so many begins elsewhere on the clock, for a take that begins in mid-movement.
 _ELSEWHERE = 10
+# Probability of a restart at the end of the movement in a hundredth of the mean duration.
+_RESTART = 0.01
 # Divides the log-likelihood of the velocities of every hundredth of the mean duration.
 _TEMPERING = 10.0
 # While the phase is lost, particles are reinitialised after so many memories of the NIS.
@@ -443,7 +445,12 @@ class ParticleFilter:
         if self.slopes.width != n_observed:
             self.slopes = CausalSlopes(self.model.n_particles, n_observed, self.model.clock.window)
         if self.lost and self.since_search > _RETRY * self.model.clock.memory:
-            self._reinitialise()
+            # Over the whole clock.
+            n = self.model.n_particles
+            phases = (self.rng.random() + np.arange(n)) / n * self.model.clock.last
+            self._initialise(phases, self.slopes.width)
+            # The phase stays lost until later observations agree with it.
+            self.nis = self.model.nis_limits
         elif dt > 0:
             self._predict(dt, observer.matrix)
         self.expected = at_times(self.model.mean, self.particles.phases)
@@ -459,14 +466,6 @@ class ParticleFilter:
         self.deviations.begin(n)
         self.slopes = CausalSlopes(n, n_observed, model.clock.window)
         self.nis, self.since_search, self.initial = np.ones(2), 0.0, True
-
-    def _reinitialise(self):
-        """Spread the particles over the whole clock."""
-        n = self.model.n_particles
-        phases = (self.rng.random() + np.arange(n)) / n * self.model.clock.last
-        self._initialise(phases, self.slopes.width)
-        # The phase stays lost until later observations agree with it.
-        self.nis = self.model.nis_limits
 
     def _predict(self, dt, matrix):
         """Resample the particles if need be, and let a time pass."""
@@ -497,16 +496,13 @@ class ParticleFilter:
         self.accepted = seen
         self.innovation = float(self.particles.weights @ update.nis)
         self.slopes.add(residuals, seen)
-        pose_nis = self._pose_nis(self.particles.weights @ residuals, rows, noise)
+        # Of the pose, from the mean.
+        spread = rows @ self.model.process.covariance @ rows.T + noise
+        whitened = whitening(spread) @ (self.particles.weights @ residuals)
+        pose_nis = self._shrink_nis(whitened @ whitened / len(rows), len(rows))
         known = self.slopes.have_slopes(seen)
         velocity_nis = self._reweight(known, observer, dt) if known.any() else self.nis[0]
         self._update_nis(np.array([velocity_nis, pose_nis]), dt)
-
-    def _pose_nis(self, residuals, rows, noise):
-        """NIS of a pose with these residuals (n_seen,) from the mean."""
-        covariance = rows @ self.model.process.covariance @ rows.T + noise
-        whitened = whitening(covariance) @ residuals
-        return self._shrink_nis(whitened @ whitened / len(rows), len(rows))
 
     def _reweight(self, known, observer, dt):
         """Weigh the particles by the velocities with this mask (n_observed,); their NIS."""
@@ -517,7 +513,11 @@ class ParticleFilter:
         distances = squared_norms(slopes @ whitening(covariance).T)
         # Evidence is weighted by its duration, so that the frame rate does not matter.
         share = 100 * min(dt, clock.window) / clock.duration
-        self.particles = self.particles.reweight(-0.5 * share / _TEMPERING * distances)
+        # Bayes' rule; the weights sum to 1.
+        log_weights = self.particles.log_weights - 0.5 * share / _TEMPERING * distances
+        top = log_weights.max()
+        log_weights -= top + np.log(np.exp(log_weights - top).sum())
+        self.particles = self.particles._replace(log_weights=log_weights)
         return self._shrink_nis(self.particles.weights @ distances / len(rows), len(rows))
 
     def _shrink_nis(self, nis, n):
@@ -572,7 +572,9 @@ class Particles(NamedTuple):
         n, before = len(self.phases), self.log_rates
         means, deviation = rate_process.predict(before, dt)
         log_rates = means + deviation * rng.standard_normal(n)
-        restarted = (self.phases >= clock.last) & (rng.random(n) < clock.restart_probability(dt))
+        # Restart times are exponential.
+        restarts = rng.random(n) < 1 - (1 - _RESTART) ** (100 * dt / clock.duration)
+        restarted = (self.phases >= clock.last) & restarts
         fresh = rate_process.draw(rng, n)
         # The rate in between is that of the mean log rate.
         moved = self.phases + np.exp((before + log_rates) / 2) * dt * clock.speed
@@ -582,13 +584,6 @@ class Particles(NamedTuple):
             self.log_weights,
             restarted,
         )
-
-    def reweight(self, log_likelihoods):
-        """Bayes' rule; the weights sum to 1."""
-        log_weights = self.log_weights + log_likelihoods
-        top = log_weights.max()
-        log_weights = log_weights - (top + np.log(np.exp(log_weights - top).sum()))
-        return self._replace(log_weights=log_weights)
 
 
 def systematic_resampling(weights, start, n):

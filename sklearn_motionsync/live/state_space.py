@@ -33,8 +33,6 @@ _CHANCE = 8.0
 _MIN_POSE_LIMIT = 9.0
 # The gate of single observations: a NIS, or so many times the largest of the training set.
 _MIN_GATE, _GATE_FACTOR = 100.0, 10.0
-# Probability of a restart at the end of the movement in a hundredth of the mean duration.
-_RESTART = 0.01
 
 
 class TrackerModel(NamedTuple):
@@ -87,18 +85,32 @@ class TrackerModel(NamedTuple):
         pooled_mean = warped.mean(axis=(0, 1))
         pooled = MaternProcess.learn(warped - pooled_mean, _POOLED_SHRINKAGE, step)
         rates = RateProcess.learn(rates, step)
-        slopes, unit_noise = _causal_slopes(deviations, step, clock.window)
+        n, n_frames, width = deviations.shape
+        # Causal velocities (n, P - 1, n_features), and their variances by unit noise (P - 1,); and
+        # the largest NIS of a frame, of a Kalman filter of each take at its own phase.
+        causal, fits, seen = CausalSlopes(n, width, clock.window), [], np.ones(width, dtype=bool)
+        running, rows, largest = DeviationFilter(process, n), np.eye(width), 0.0
+        for p in range(n_frames):
+            causal.advance(step)
+            causal.add(deviations[:, p], seen)
+            if p:
+                fits.append(causal.fit(seen))
+                running.predict(step)
+            update = running.correct(deviations[:, p], rows, noise)
+            largest = max(largest, float(update.nis.max()))
+        slopes = np.stack([values for values, _ in fits], axis=1)
+        unit_noise = np.array([variances[0] for _, variances in fits])
         velocities = _shrunk(_moments(slopes), _SHRINKAGE)
         by_velocity = _largest_nis(slopes, unit_noise, noise, velocities, step, clock.memory)
-        once = np.ones(deviations.shape[1])
+        once = np.ones(n_frames)
         by_pose = _largest_nis(deviations, once, noise, process.covariance, step, clock.memory)
         # Velocities of different windows are independent.
-        chance = _CHANCE * np.sqrt(2 / (warped.shape[2] * _MEMORY))
+        chance = _CHANCE * np.sqrt(2 / (width * _MEMORY))
         excess = (
             max(_EXCESS[0] * (by_velocity - 1), chance),
             max(_EXCESS[1] * (by_pose - 1), _MIN_POSE_LIMIT - 1),
         )
-        gate = max(_MIN_GATE, _GATE_FACTOR * _largest_innovation(deviations, process, step, noise))
+        gate = max(_MIN_GATE, _GATE_FACTOR * largest)
         return cls(
             warped.mean(axis=0),
             process,
@@ -128,10 +140,6 @@ class Clock(NamedTuple):
     def speed(self):
         """Frames of the clock that a trial of mean duration passes a unit of time."""
         return self.last / self.duration
-
-    def restart_probability(self, dt):
-        """Of a movement at its end, within a time: restart times are exponential."""
-        return 1 - (1 - _RESTART) ** (100 * dt / self.duration)
 
     @property
     def window(self):
@@ -270,19 +278,6 @@ def _correlation_lag(series, level):
 # -- limits of the normalised innovation squared, from the training trials ---------
 
 
-def _causal_slopes(deviations, step, window):
-    """Causal velocities (n, P - 1, n_features), and their variances by unit noise (P - 1,)."""
-    n, n_frames, width = deviations.shape
-    slopes, seen, fits = CausalSlopes(n, width, window), np.ones(width, dtype=bool), []
-    for p in range(n_frames):
-        slopes.advance(step)
-        slopes.add(deviations[:, p], seen)
-        if p:
-            fits.append(slopes.fit(seen))
-    values, noise = zip(*fits, strict=True)
-    return np.stack(values, axis=1), np.array([a[0] for a in noise])
-
-
 def _largest_nis(departures, shares, noise, covariance, step, memory):
     """The largest average NIS of takes (n, n_frames, n_features) at their own phase, at least 1.
 
@@ -297,18 +292,6 @@ def _largest_nis(departures, shares, noise, covariance, step, memory):
         nis = exponential_average(nis, now / width, step, memory)
         largest = np.maximum(largest, nis)
     return float(np.max(largest))
-
-
-def _largest_innovation(deviations, process, step, noise):
-    """The largest NIS of a frame, of a Kalman filter of each take at its own phase."""
-    n, n_frames, width = deviations.shape
-    running, rows, largest = DeviationFilter(process, n), np.eye(width), 0.0
-    for p in range(n_frames):
-        if p:
-            running.predict(step)
-        update = running.correct(deviations[:, p], rows, noise)
-        largest = max(largest, float(update.nis.max()))
-    return largest
 
 
 def exponential_average(before, now, dt, memory):
@@ -413,12 +396,6 @@ class KalmanUpdate(NamedTuple):
         """Normalised innovation squared per observed number: (n,)."""
         return squared_norms(self.whitened) / self.whitened.shape[1]
 
-    @property
-    def corrections(self):
-        """``K v``: (2, n, n_features)."""
-        n_seen, n_features = self.obs_rows.shape
-        return self.whitened @ self.gain_rows.reshape(n_seen, 2, n_features).swapaxes(0, 1)
-
 
 def whitening(covariance):
     """The inverse of the Cholesky factor of a covariance."""
@@ -476,6 +453,8 @@ class DeviationFilter:
             covariance = self.covariance - gain_rows.T @ gain_rows
             if not (update.nis <= gate).any():
                 return None
-        self.means = self.means + update.corrections
+        # The Kalman gain times the innovations.
+        gains = gain_rows.reshape(len(rows), 2, width).swapaxes(0, 1)
+        self.means = self.means + update.whitened @ gains
         self.covariance = covariance
         return update

@@ -308,9 +308,9 @@ class Streams:
         # Noise raises all costs, and the differences between phases with them.
         temperature = self.reference.interval_temperature * excess
         temperature *= (np.maximum(excess / _UNUSUAL, 1) / self._feature_share) ** 2
-        bounds = cyclic_bounds if self.reference.cyclic else phase_bounds
-        edges = bounds(gains[:, self._whole], temperature, self._phases[-1], self._last)
-        half = self._last / 2 * self.reference.cyclic
+        cyclic, phase = self.reference.cyclic, self._phases[-1]
+        edges = phase_bounds(gains[:, self._whole], temperature, phase, self._last, cyclic)
+        half = self._last / 2 * cyclic
         return np.where(self._n_samples > 0, edges, [[-half], [half]])
 
 
@@ -410,41 +410,29 @@ def phase_probabilities(gains, temperature):
     return weights / weights.sum(axis=-1, keepdims=True)
 
 
-def phase_bounds(gains, temperature, phase, last):
+def phase_bounds(gains, temperature, phase, last, cyclic=False):
     """Bounds (2, n) between which phases lie with a probability of 90 %.
 
     The `gains_of` costs (n, n_frames) are those at whole frames up to ``last``, P - 1, and after
-    the end of the movement; over the temperature (n,) they are log-probabilities. The estimated
-    phases (n,) are between the bounds.
+    the end of the movement, or of a cycle those at its frames but the last one; over the
+    temperature (n,) they are log-probabilities. The estimated phases (n,) are between the bounds.
+
+    Those of a cycle are half a cycle from the phase at most: below 0 in the cycle before, above
+    P - 1 in the next.
     """
-    bounds = _bounds_of(_weights(gains, temperature), 0, phase, last)
-    return np.clip(bounds, 0, last)
-
-
-def cyclic_bounds(gains, temperature, phase, last):
-    """The same of a cycle, with the gains of its frames but the last one.
-
-    They are half a cycle from the phase at most: below 0 in the cycle before, above P - 1 in the
-    next.
-    """
-    first = np.round(phase).astype(np.intp) - last // 2
-    frames = (first[:, np.newaxis] + np.arange(last)) % last
-    weights = np.take_along_axis(_weights(gains, temperature), frames, axis=1)
-    return _bounds_of(weights, first, phase, last)
-
-
-def _weights(gains, temperature):
     # Half the digits are enough, and nothing overflows.
     logs = np.maximum(gains / temperature[:, np.newaxis], _MIN_LOG_WEIGHT)
-    return np.exp(logs.astype(np.float32))
-
-
-def _bounds_of(weights, first, phase, last):
-    """Quantiles of the weights of frames, given the first frame; not too near to the phase."""
+    weights, first = np.exp(logs.astype(np.float32)), 0
+    if cyclic:
+        first = np.round(phase).astype(np.intp) - last // 2
+        frames = (first[:, np.newaxis] + np.arange(last)) % last
+        weights = np.take_along_axis(weights, frames, axis=1)
     mass = weights.cumsum(axis=1)
-    bounds = first + (mass >= (mass[:, -1] * _TAILS)[..., np.newaxis]).argmax(axis=-1)
+    lower, upper = first + (mass >= (mass[:, -1] * _TAILS)[..., np.newaxis]).argmax(axis=-1)
+    # Not too near to the phase.
     least = max(1.0, _LEAST * last)
-    return np.array([np.minimum(bounds[0], phase - least), np.maximum(bounds[1], phase + least)])
+    bounds = np.array([np.minimum(lower, phase - least), np.maximum(upper, phase + least)])
+    return bounds if cyclic else np.clip(bounds, 0, last)
 
 
 def check_observations(x, what, names, width, ndims=(1,)) -> np.ndarray:

@@ -34,7 +34,6 @@ from .stream import (
     Session,
     check_observations,
     check_times,
-    cyclic_bounds,
     gains_of,
     phase_bounds,
     phase_probabilities,
@@ -567,16 +566,16 @@ def calibrate(reference_of, trials, warped, times, progress):
         largest.append(largest_cost)
         subframes, last = reference.trellis.table.subframes, reference.n_frames - 1
         phases, right_phases = np.minimum(costs.argmin(axis=1) / subframes, last), truth / subframes
-        gains, bounds = gains_of(costs), phase_bounds
+        gains = gains_of(costs)
         if reference.cyclic:
             # By the shorter way from the phases.
             right_phases = right_phases + last * np.round((phases - right_phases) / last)
-            bounds = cyclic_bounds
         for k, temperature in enumerate((energy * _TEMPERATURES).tolist()):
             right = phase_probabilities(gains, temperature)[np.arange(len(costs)), truth]
             scores[k] += np.log(np.maximum(right, _MIN_PROBABILITY)).mean()
             every = np.full(len(gains), temperature)
-            lower, upper = bounds(gains[:, ::subframes], every, phases, last)
+            at_frames = gains[:, ::subframes]
+            lower, upper = phase_bounds(at_frames, every, phases, last, reference.cyclic)
             shares[k] += np.mean((lower <= right_phases) & (right_phases <= upper)) / len(chosen)
         step()
     typical_cost = max(np.median(largest), least)

@@ -224,7 +224,10 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
             clock = Clock(int(sync.n_frames_) - 1.0, float(durations.mean()))
             rates = clock.duration / durations[:, np.newaxis] / match.rates
             warped = warped.astype(np.float64)
-            noise = self._noise_of(warped.mean(axis=0))
+            if isinstance(self.noise, JointNoise):
+                noise = self.noise.covariance(warped.mean(axis=0))
+            else:
+                noise = self.noise**2 * np.eye(warped.shape[2])
             step = progress.stage("learning how people vary", 1)
             with one_blas_thread():
                 model = TrackerModel.learn(warped, rates, codes, clock, noise, self.n_particles)
@@ -356,12 +359,6 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
         return tags
-
-    def _noise_of(self, mean):
-        """The covariance of the noise of a whole pose of the mean trial."""
-        if isinstance(self.noise, JointNoise):
-            return self.noise.covariance(mean)
-        return self.noise**2 * np.eye(mean.shape[1])
 
     def _observer(self, projection):
         """The `Observer` of a projection, and the offset of what it observes."""
