@@ -8,8 +8,6 @@ import numpy as np
 import pandas as pd
 from scipy.fft import irfft, next_fast_len, rfft
 
-from ..body.direction_cosines import DirectionCosines
-from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection, check_members
 from ..inputs.tables import as_pandas
 from ..inputs.types import TrialLike
@@ -93,7 +91,7 @@ class SelfCorrelation(NamedTuple):
     periods: np.ndarray
 
 
-def self_correlation(take: TrialLike, skeleton: Skeleton | None = None) -> SelfCorrelation:
+def self_correlation(take: TrialLike) -> SelfCorrelation:
     r"""Correlate a take with itself at every lag, to find the period of what repeats.
 
     At lag :math:`L` it correlates the frames :math:`a(t) = x(t)` and :math:`b(t) = x(t + L)`, less
@@ -109,10 +107,8 @@ def self_correlation(take: TrialLike, skeleton: Skeleton | None = None) -> SelfC
     Parameters
     ----------
     take : array-like or DataFrame, shape (n_frames, n_features)
-        One take.
-    skeleton : Skeleton, default=None
-        Skeleton of joint positions, whose direction cosines are correlated; None correlates the
-        features themselves, each weighted by its variance.
+        One take. Features are weighted by their variance; of joint positions give those that
+        `DirectionCosines` makes of them.
 
     Returns
     -------
@@ -159,8 +155,6 @@ def self_correlation(take: TrialLike, skeleton: Skeleton | None = None) -> SelfC
             "for several use CycleSegmenter().report(X)."
         )
     (array,) = check_members([take])
-    if skeleton is not None:
-        (array,) = DirectionCosines(skeleton).fit_transform([take])
     return correlate(np.asarray(array))
 
 
