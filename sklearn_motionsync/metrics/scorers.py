@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from numbers import Integral
 from typing import Any
 
@@ -23,8 +24,8 @@ __all__ = ["FeatureHoldoutScorer", "SpreadScorer"]
 class _SynchronizerScorer(BaseEstimator):
     """Base of the scorers: the metadata that may be requested, and what is scored.
 
-    A scorer has a ``_score(reached, params)``, of the synchronizer and the trials that `_reach`
-    found; ``_uses`` names the methods whose metadata it takes.
+    A scorer has a ``_score(reached, params)``, of the synchronizer and of at least two trials that
+    reach it; ``_uses`` names the methods whose metadata it takes.
     """
 
     _uses: tuple[str, ...] = ("match",)
@@ -67,13 +68,6 @@ class _SynchronizerScorer(BaseEstimator):
         TypeError
             If the synchronizer does not accept one of the params.
         """
-        return self._score(self._reach(estimator, X, params), params)
-
-    # Of a method of this name scikit-learn makes `set_score_request`.
-    score = __call__
-
-    def _reach(self, estimator, X, params):
-        """The synchronizer and the trials, at least two."""
         name = type(self).__name__
         hint = (
             f"; in cross_val_score and searches by metadata routing, sklearn.set_config("
@@ -89,7 +83,10 @@ class _SynchronizerScorer(BaseEstimator):
                 "In cross-validation each test fold needs at least 2: instead of LeaveOneOut use "
                 "fewer folds, such as cv=2 or KFold(len(X) // 2), or LeavePOut(2)."
             )
-        return reached
+        return self._score(reached, params)
+
+    # Of a method of this name scikit-learn makes `set_score_request`.
+    score = __call__
 
 
 class SpreadScorer(_SynchronizerScorer):
@@ -182,7 +179,7 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
                 f"n_folds={self.n_folds!r} must be between 2 and the {n_features} features there "
                 "are, a whole number."
             )
-        if reached.takes_params:
+        if len(inspect.signature(synchronizer.match).parameters) > 1:
             # Metadata that the estimator needs are missing for its clones, too.
             reached.match()
         params = known_keyframes(trials, params)

@@ -120,7 +120,11 @@ class MotionKernel:
             d[:] = cdist(statistics, self._summaries[-1], "sqeuclidean")
         is_pair = np.ones(distances[0].shape, dtype=bool)
         is_pair[landmarks, np.arange(len(landmarks))] = False
-        self._medians = [_positive_median(d[is_pair]) for d in distances]
+        # Where the median is 0 it is the mean, and where that is, or there is no pair, 1.
+        pairs = [d[is_pair] for d in distances]
+        self._medians = [
+            (float(np.median(d)) or float(d.mean()) or 1.0) if d.size else 1.0 for d in pairs
+        ]
         self._side_by_side = bool(is_other.any())
         views = self._as_views(distances)
         groups = np.arange(len(scaled)) if groups is None else groups
@@ -234,13 +238,6 @@ def change_shares(changes, units):
     levels = _LEVELS[:, np.newaxis, np.newaxis, np.newaxis]
     excess = (changes / units[:, np.newaxis] - levels) / _SOFTNESS
     return np.tanh(excess).mean(axis=2).ravel()
-
-
-def _positive_median(distances):
-    """The median; if that is 0, the mean, and if that is, 1."""
-    if not distances.size:
-        return 1.0
-    return float(np.median(distances)) or float(distances.mean()) or 1.0
 
 
 # -- multinomial logistic regression with a kernel -------------------------------------------------

@@ -331,7 +331,24 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 cycles_of_stretch
             )
         table = pd.DataFrame(rows, columns=list(_COLUMNS)).astype(_COLUMNS)
-        _warn_of_lengths(takes, table, np.array(periods))
+        # Whole cycles that are far longer or far shorter than the period of their stretch.
+        shares = ((table["stop"] - 1 - table["start"]) / np.array(periods))[table["complete"]]
+        odd = shares[(shares < _SHORT) | (shares > _LONG)]
+        if not odd.empty:
+            row = odd.index[0]
+            i, start, stop = table.loc[row, ["take", "start", "stop"]]
+            content = "only a part of a repetition"
+            if odd[row] > 1:
+                content = "several repetitions, or a rest"
+            warnings.warn(
+                f"{takes.called(i)}: the cycle from start {start} to stop {stop} has "
+                f"{stop - start} frames, but the period of the take is {periods[row]:.1f}. It may "
+                f"hold {content}. This holds for {len(odd)} of {len(shares)} whole cycles. Look at "
+                "the cuts with CycleDisplay, leave such cycles out by 'start' and 'stop' of the "
+                "table, or cut by other features.",
+                UserWarning,
+                stacklevel=2,
+            )
         return cut_takes(collection, takes, table)
 
     def phases(self, X: TrialsLike) -> list[np.ndarray]:
@@ -617,22 +634,3 @@ def _phase_of(start, strikes, sampled, phases):
     if not len(at):
         raise ValueError(f"No {start} is found where the takes repeat; look at gait_events(X).")
     return float(np.angle(np.exp(2j * np.pi * at).mean()) / (2 * np.pi))
-
-
-def _warn_of_lengths(takes, table, periods):
-    """Warn of whole cycles that are far longer or far shorter than the period of their stretch."""
-    shares = ((table["stop"] - 1 - table["start"]) / periods)[table["complete"]]
-    odd = shares[(shares < _SHORT) | (shares > _LONG)]
-    if odd.empty:
-        return
-    row = odd.index[0]
-    i, start, stop = table.loc[row, ["take", "start", "stop"]]
-    several = "several repetitions, or a rest" if odd[row] > 1 else "only a part of a repetition"
-    warnings.warn(
-        f"{takes.called(i)}: the cycle from start {start} to stop {stop} has {stop - start} "
-        f"frames, but the period of the take is {periods[row]:.1f}. It may hold {several}. This "
-        f"holds for {len(odd)} of {len(shares)} whole cycles. Look at the cuts with CycleDisplay, "
-        "leave such cycles out by 'start' and 'stop' of the table, or cut by other features.",
-        UserWarning,
-        stacklevel=3,
-    )

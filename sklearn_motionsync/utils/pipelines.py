@@ -157,11 +157,6 @@ class Routed(NamedTuple):
         rows = Keyframes(keyframes, len(self.trials), self.params.get("frame_rate"))
         return pd.DataFrame(rows.shares(self.trials), columns=getattr(keyframes, "columns", None))
 
-    @property
-    def takes_params(self):
-        """Whether ``match`` takes more than trials."""
-        return len(inspect.signature(self.synchronizer.match).parameters) > 1
-
     def match(self):
         """The trials matched to the pattern."""
         if self.known is not None:
