@@ -14,7 +14,8 @@
 
 from importlib import import_module
 
-from .body.direction_cosines import DirectionCosines, JointPositions
+from .body.direction_cosines import DirectionCosines
+from .body.joint_positions import JointPositions
 from .body.skeleton import Skeleton
 from .inputs.findings import TrialWarning, check_trials, mend_trials
 from .inputs.long_tables import to_frame, to_trials

@@ -5,7 +5,9 @@ depend on place, facing and size, and `JointPositions` turns poses back. `mirror
 right, and `JointNoise` tells how exactly the joints were measured.
 """
 
-from .direction_cosines import DirectionCosines, JointNoise, JointPositions
+from .direction_cosines import DirectionCosines
+from .joint_noise import JointNoise
+from .joint_positions import JointPositions
 from .mirror import mirror
 from .skeleton import Skeleton
 

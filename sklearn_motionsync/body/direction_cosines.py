@@ -1,18 +1,15 @@
-"""DirectionCosines: poses of joint positions (Eq. 1), and back; JointPositions, and JointNoise."""
+"""DirectionCosines: poses of joint positions (Eq. 1), and back."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import LARGEST
 from ..inputs.types import Transformed, TrialsLike
 from ..inputs.validation import check_transformed, restore
-from ..inputs.wording import counted
 from .axes import convert_to_parent_axes, project_on_axes
 from .base import PositionsTransformer, mask_hidden
 from .formats import AXES, LANDMARKS, SIDES
@@ -21,7 +18,6 @@ from .limbs import (
     LIMB_NAMES,
     LIMBS,
     body_size,
-    landmark_positions,
     limb_indices,
     lowest_height,
     unit_vectors,
@@ -351,236 +347,3 @@ def _joined(at, skeleton):
 
 
 # -- positions of joints -------------------------------------------------------------------
-
-
-class JointPositions(PositionsTransformer):
-    """Positions of the joints of a body relative to its pelvis: 42 features.
-
-    For each landmark of the paper's body model except the pelvis, its position relative to the
-    pelvis in leg lengths. The features are invariant to the place and the size of the body, and
-    with the default axes to its heading.
-
-    A skeleton that lacks landmarks has the positions of its own; key-points in a picture
-    have two coordinates each.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Which columns are which joints: a known one such as ``Skeleton.acclaim()``, that of a
-        table, ``Skeleton.from_frame(df)``, or your own.
-    reference : {"heading", "world"}, default="heading"
-        The axes. ``"heading"``: those of the body at each frame, x to the left along the hips,
-        y up, z forward, as in `DirectionCosines`. ``"world"``: those of the recording, turned so
-        that y is vertical. In the plane both are the picture's, x across and y up.
-    hidden : {"raise", "nan"}, default="raise"
-        How NaN, the positions of hidden joints, are treated. ``"raise"``: they are an error.
-        ``"nan"``: a joint is hidden in a frame if any of its coordinates is NaN, and its features
-        are NaN in that frame. Where the origin is hidden, the pelvis, all are.
-
-    Attributes
-    ----------
-    limb_lengths_ : ndarray, shape (n_limbs,)
-        Median length of each of ``skeleton.limbs`` over the frames of ``fit`` that show it, in
-        the unit of the positions.
-    n_features_in_ : int
-        The number of joints times that of their axes.
-    feature_names_in_ : ndarray of str
-        Names of the columns; only if the input had names.
-
-    See Also
-    --------
-    DirectionCosines : Poses of the directions of limbs, with an inverse.
-
-    Notes
-    -----
-    The unit is that of the pelvis' height in `DirectionCosines`: the length of the stretched leg,
-    the median over the trial; of a body without a complete leg, the sum of its limbs.
-    Without a pelvis, positions are relative to the first of these that is there: the middle of the
-    hips, the neck, the middle of the shoulders, the first landmark. A 2-D input is one trial.
-
-    Hidden hips, and lengths of limbs that a trial never shows, are treated as in
-    `DirectionCosines`.
-
-    `DirectionCosines` weighs all limbs alike; positions weigh long limbs more.
-    scikit-learn's ``make_union`` joins the features of both, frame by frame. It needs pandas output
-    for that, as in the example: without it a union takes the list or 3-D array of each
-    transformer for one matrix, and refuses it with a message about shapes. Where all widths and
-    all lengths are equal (``"heading"`` beside ``"world"``, trials of the same number of
-    frames) it may join a list along time. A 2-D input, one trial, needs no pandas. Keep the
-    prefixes that the union puts before names: "neck" is both a limb and a joint.
-
-    Examples
-    --------
-    >>> from sklearn_motionsync import JointPositions
-    >>> from sklearn_motionsync.datasets import make_bending
-    >>> bunch = make_bending(4, random_state=0)
-    >>> positions = JointPositions(bunch.skeleton).fit(bunch.data)
-    >>> positions.transform(bunch.data)[0].shape[1], list(positions.get_feature_names_out()[:3])
-    (42, ['neck_x', 'neck_y', 'neck_z'])
-
-    Both kinds of features, synchronised:
-
-    >>> from sklearn.pipeline import make_pipeline, make_union
-    >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines
-    >>> views = make_union(DirectionCosines(bunch.skeleton), JointPositions(bunch.skeleton))
-    >>> views = views.set_output(transform="pandas")
-    >>> table = views.fit_transform(bunch.data)
-    >>> table.shape[1], table.index.names
-    (79, FrozenList(['trial', 'frame']))
-    >>> make_pipeline(views, DenseSynchronizer(50)).fit_transform(bunch.data).shape
-    (4, 50, 79)
-    """
-
-    _parameter_constraints: dict = {
-        "skeleton": [Skeleton],
-        "reference": [StrOptions({"heading", "world"})],
-        "hidden": [StrOptions({"raise", "nan"})],
-    }
-
-    def __init__(
-        self,
-        skeleton: Skeleton,
-        reference: Literal["heading", "world"] = "heading",
-        hidden: Literal["raise", "nan"] = "raise",
-    ) -> None:
-        self.skeleton = skeleton
-        self.reference = reference
-        self.hidden = hidden
-
-    @property
-    def _names(self):
-        axes = AXES[self.skeleton.n_dims]
-        return [f"{landmark}_{axis}" for landmark in self._landmarks for axis in axes]
-
-    @property
-    def _landmarks(self):
-        """The landmarks whose positions are features: all but the origin."""
-        origin = _origin_of(self.skeleton)
-        return [name for name in self.skeleton.landmarks if [name] != origin]
-
-    def _features(self, portion, body):
-        origin = [portion.position_of(name) for name in _origin_of(self.skeleton)]
-        # The pelvis is the first landmark, and the origin if it is there.
-        middle = (sum(origin) / len(origin))[:, np.newaxis]
-        places = (portion.points[:, 1:] - middle) / self._size_of(body)
-        axes = portion.axes if self.reference == "heading" else None
-        if axes is not None:
-            places = project_on_axes(places, axes)
-        places = places[:, [LANDMARKS.index(name) - 1 for name in self._landmarks]]
-        return places.reshape(len(places), -1)
-
-
-def _origin_of(skeleton):
-    """The landmarks whose mean is the origin."""
-    choices = [["pelvis"], [f"{side}_hip" for side in SIDES], ["neck"]]
-    choices += [[f"{side}_shoulder" for side in SIDES], [next(iter(skeleton.landmarks))]]
-    return next(names for names in choices if set(names) <= set(skeleton.landmarks))
-
-
-# -- noise of joints ------------------------------------------------------------------------
-
-# Draws of every pose, and their seed.
-_DRAWS, _SEED = 20, 0
-
-
-@dataclass(frozen=True)
-class JointNoise:
-    """Noise of joint positions, for a tracker of direction cosines.
-
-    The same error of a joint turns a short limb farther than a long one, moves both limbs that meet
-    there, and by way of the hips the heading of the whole body. ``MotionTracker(noise=JointNoise(
-    0.02, cosines))`` accounts for that: joints are off by 2 cm, in metres.
-
-    Parameters
-    ----------
-    sd : float
-        Standard deviation of every coordinate of a joint, in the unit of the positions that
-        ``cosines`` was fitted on.
-    cosines : DirectionCosines
-        The fitted transformer that makes the poses.
-
-    Raises
-    ------
-    ValueError
-        If ``sd`` is not a number above 0.
-    TypeError
-        If ``cosines`` are no `DirectionCosines`.
-    sklearn.exceptions.NotFittedError
-        If ``cosines`` are not fitted.
-
-    See Also
-    --------
-    MotionTracker : Takes it as its ``noise``.
-
-    Notes
-    -----
-    The covariance is that of 20 draws of each pose, with limbs of the lengths of ``cosines``. A
-    landmark that is the mean of several markers has the noise of that mean.
-
-    Examples
-    --------
-    >>> from sklearn_motionsync import DirectionCosines
-    >>> from sklearn_motionsync.body import JointNoise
-    >>> from sklearn_motionsync.datasets import make_bending
-    >>> bending = make_bending(4, random_state=0)
-    >>> cosines = DirectionCosines(bending.skeleton).fit(bending.data)
-    >>> noise = JointNoise(0.02, cosines)  # 2 cm
-    >>> covariance = noise.covariance(cosines.transform(bending.data)[0])
-    >>> names = list(cosines.get_feature_names_out())
-    >>> hips, thigh = names.index("hip_y"), names.index("left_thigh_x")
-    >>> bool(covariance[hips, hips] > 1.5 * covariance[thigh, thigh])  # hips are shorter
-    True
-    """
-
-    sd: float
-    cosines: DirectionCosines
-
-    def __post_init__(self):
-        if not isinstance(self.cosines, DirectionCosines):
-            raise TypeError(
-                "JointNoise needs the fitted DirectionCosines that make the poses, got "
-                f"{type(self.cosines).__name__}."
-            )
-        check_is_fitted(self.cosines)
-        if not 0 < self.sd <= LARGEST:
-            raise ValueError(
-                f"sd must be a number above 0, in the unit of the joints; got {self.sd!r}."
-            )
-
-    def covariance(self, poses: np.ndarray) -> np.ndarray:
-        """Second moments of the errors of poses whose joints are off.
-
-        Parameters
-        ----------
-        poses : ndarray, shape (n_frames, n_features)
-            Direction cosines, over which it is averaged.
-
-        Returns
-        -------
-        ndarray, shape (n_features, n_features)
-            About 0: noise of joints also makes mean cosines shorter.
-
-        Raises
-        ------
-        ValueError
-            If the poses have another width than ``cosines`` make.
-        """
-        width = len(self.cosines.get_feature_names_out())
-        if poses.ndim != 2 or poses.shape[1] != width:
-            raise ValueError(
-                f"The DirectionCosines of this JointNoise make {counted(width, 'feature')} a "
-                f"frame, and the trials have the shape {poses.shape}. Give those that "
-                "made the trials."
-            )
-        skeleton, (positions,) = self.cosines.skeleton, self.cosines.inverse_transform([poses])
-        body, rng = skeleton.body(), np.random.default_rng(_SEED)
-        order = [LANDMARKS.index(name) for name in body.joints]
-        again = DirectionCosines(body, self.cosines.reference).fit([positions])
-        (exact,) = again.transform([positions])
-        moments = np.zeros((width, width))
-        for _ in range(_DRAWS):
-            size = len(positions), skeleton.n_dims * len(skeleton.joints)
-            moved = landmark_positions(self.sd * rng.standard_normal(size), skeleton)[:, order]
-            (noisy,) = again.transform([positions + moved.reshape(positions.shape)])
-            moments += (noisy - exact).T @ (noisy - exact)
-        return moments / (_DRAWS * len(positions))

@@ -11,7 +11,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
-from ..body.direction_cosines import JointNoise
+from ..body.joint_noise import JointNoise
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS, check_facts, facts_of
 from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from sklearn.utils import check_random_state
 
-from ..body.blends import exp_map, log_map, mean_direction
 from ..body.limbs import unit_vectors
+from ..body.sphere import exp_map, log_map, mean_direction
 from ..matching.counting import first_smallest
 from ..matching.gaps import is_gappy
 from ..utils.groups import group_counts, mean_of_others, sums_of_groups

@@ -12,7 +12,7 @@ from sklearn.base import BaseEstimator
 
 from ..body.base import PositionsTransformer
 from ..body.blends import blend_bodies, blend_numbers
-from ..body.direction_cosines import JointPositions
+from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
 from ..inputs.facts import compare_facts

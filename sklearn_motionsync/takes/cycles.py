@@ -13,8 +13,9 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..body.direction_cosines import DirectionCosines, JointPositions
+from ..body.direction_cosines import DirectionCosines
 from ..body.formats import SIDES
+from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..gait.events import LEAST_STEP, events_of
 from ..gait.recordings import FOOT_STRIKE, Recordings

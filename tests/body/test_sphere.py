@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from sklearn_motionsync.body.blends import mean_direction, mean_vector
+from sklearn_motionsync.body.sphere import mean_direction, mean_vector
 
 
 def directions(n, dims, around=None, seed=0):
