@@ -53,7 +53,7 @@ print(lags.summary().round(2))
 # -------------------
 # Red is late. Hatched lags have an interval that holds 0.
 
-display = LagDisplay.from_predictions(lags)
+display = LagDisplay(lags).plot()
 icc = lags.summary()["icc"]
 display.figure_.suptitle(
     f"The late arm belongs to some people (ICC {icc['right arm']:.2f}),\n"

@@ -17,7 +17,6 @@ from ..utils.pipelines import flat_steps
 from .base import text_of_label
 
 __all__ = [
-    "TIME_LABELS",
     "as_frames",
     "as_index",
     "as_indices",
@@ -25,12 +24,11 @@ __all__ = [
     "as_trials",
     "labels_as_text",
     "labels_of_signals",
+    "time_label",
     "times_from_zero",
     "undo_scaling",
 ]
 
-# Labels of the time axis of live takes, by unit.
-TIME_LABELS = {"frames": "time (frames)", "seconds": "time (s)"}
 # Characters of a label and its unit that are too long for one line.
 _LONG = 18
 # The largest number of panels.
@@ -139,12 +137,17 @@ def _by_name(texts, names, default, what):
     return [str(texts.get(name, default[name])) for name in names]
 
 
-def times_from_zero(times, n_frames):
-    """Times since the first frame; frame numbers if there are no times."""
+def times_from_zero(times, n_frames, frame_rate):
+    """Times of a live take since the first frame; by the frame rate, or frames, without stamps."""
     if times is None:
-        return np.arange(float(n_frames))
+        return np.arange(n_frames) / (frame_rate or 1.0)
     times = np.asarray(times, dtype=np.float64)
     return times - times[0]
+
+
+def time_label(frame_rate):
+    """The label of the time axis of a live take."""
+    return "time (frames)" if frame_rate is None else "time (s)"
 
 
 def undo_scaling(before, X, width):

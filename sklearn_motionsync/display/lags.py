@@ -27,7 +27,8 @@ class LagDisplay(Display):
 
     The map shows the mean lag. It is hatched where the 95 % confidence interval of the mean
     contains 0. The curves show the mean and the interval; broken lines are one standard deviation
-    of trials from the mean. Use `from_estimator`.
+    of trials from the mean. Use `from_estimator`, or ``LagDisplay(lags).plot()`` with lags that are
+    known already.
 
     Parameters
     ----------
@@ -115,41 +116,6 @@ class LagDisplay(Display):
         )
         rates = reached.facts.frame_rates if reached.facts.are_timed else None
         lags = reached.synchronizer.lags(reached.trials, groups, unit=unit, frame_rate=rates)
-        return cls(lags, xlabel=xlabel).plot(ax)
-
-    @classmethod
-    def from_predictions(
-        cls,
-        lags: Lags,
-        *,
-        xlabel: str | None = None,
-        ax: AxesLike | None = None,
-    ) -> Self:
-        """Draw lags that are known already.
-
-        Parameters
-        ----------
-        lags : Lags
-            The result of `PartSynchronizer.lags`.
-        xlabel : str, default=None
-            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
-        ax : Axes or array-like of Axes, default=None
-            See `plot`.
-
-        Returns
-        -------
-        LagDisplay
-            The display, drawn.
-
-        Raises
-        ------
-        ValueError
-            If ``lags`` is not of class `Lags`.
-        """
-        if not isinstance(lags, Lags):
-            raise ValueError(
-                f"lags must be the result of PartSynchronizer.lags; got {type(lags).__name__}."
-            )
         return cls(lags, xlabel=xlabel).plot(ax)
 
     def _layout(self):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import fill
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -17,18 +17,18 @@ from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.types import Features, Indexed, TrialsLike, ValuesLike
 from ..inputs.wording import counted
-from ..live.stream import Course, LivePhase, each_value
+from ..live.stream import Course, LivePhase
 from ..live.synchronizer import OnlineSynchronizer
 from ..matching.counting import first_largest
 from ..utils.pipelines import find_step
 from .animation import MovingDisplay
 from .arguments import (
-    TIME_LABELS,
     as_index,
     as_names,
     as_trials,
     labels_as_text,
     labels_of_signals,
+    time_label,
     times_from_zero,
 )
 from .base import COLORS, WIDTH, AxesLike, front_line, legend_above
@@ -66,8 +66,7 @@ class PhaseDisplay(MovingDisplay):
     tenth of the mean duration at the present rate; the phase over time with its interval and its
     confidence; and features, as far as they were observed, with the predicted rest: the mean from
     the phase on, for as long as `OnlineSynchronizer.time_left` estimates. With ``body`` also a
-    stick figure, before the mean one at the end of that arc. Make one with `from_estimator` or
-    `from_predictions`.
+    stick figure, before the mean one at the end of that arc. Use `from_estimator`.
 
     Parameters
     ----------
@@ -75,14 +74,12 @@ class PhaseDisplay(MovingDisplay):
         The learnt action, with its clock.
     trials : list of RunningTrial
         The trials with their phases.
-    features : list of str, default=()
+    features : list of str
         The labels of the features.
-    skeleton : Skeleton, default=None
+    skeleton : Skeleton or None
         The skeleton of the bodies.
-    unit : {"frames", "seconds"}, default="frames"
-        The unit of the times.
-    xlabel : str, default=None
-        The label of time axes, in place of that of the unit.
+    xlabel : str
+        The label of time axes.
 
     Attributes
     ----------
@@ -111,10 +108,9 @@ class PhaseDisplay(MovingDisplay):
 
     action: LearntAction
     trials: Sequence[RunningTrial]
-    features: Sequence[str] = ()
-    skeleton: Skeleton | None = None
-    unit: Literal["frames", "seconds"] = "frames"
-    xlabel: str | None = None
+    features: Sequence[str]
+    skeleton: Skeleton | None
+    xlabel: str
 
     def __repr__(self):
         return f"PhaseDisplay({counted(len(self.trials), 'trial')})"
@@ -135,7 +131,6 @@ class PhaseDisplay(MovingDisplay):
         xlabel: str | None = None,
         frame: int | None = None,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
     ) -> Self:
         """Follow trials, and draw their phases.
 
@@ -165,8 +160,6 @@ class PhaseDisplay(MovingDisplay):
             As in `plot`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        azimuth : float, default=-60
-            As in `plot`.
 
         Returns
         -------
@@ -191,13 +184,12 @@ class PhaseDisplay(MovingDisplay):
         if times is not None:
             listed: Any = [times] if is_single else times
             stamps = listed[:_N_TRIALS]
-        phases = live.track(trials, stamps)
+        tracked = live.track(trials, stamps)
         seen = [np.asarray(x, dtype=np.float64) for x in trials]
         feature_names = names_of_features(body, live, live.mean_.shape[1])
         if features is None:
             features = [first_largest(live.mean_.var(axis=0))]
         shown = choose_features(features, feature_names)
-        rate = 1.0 if live.frame_rate is None else live.frame_rate
         bodies, mean_body, skeleton = [None] * len(seen), None, None
         if body is not None:
             skeleton = find_step(body, DirectionCosines)[1].skeleton.body()
@@ -205,85 +197,32 @@ class PhaseDisplay(MovingDisplay):
         action = LearntAction(
             live.n_frames_,
             live.cyclic,
-            live.duration_ / rate,
+            live.duration_ / (live.frame_rate or 1.0),
             live.mean_[:, shown],
             None if training is None else _spread(live, training)[:, shown],
             mean_body,
         )
-        running = [
-            RunningTrial.of(
-                action,
-                phase,
-                np.arange(len(x)) / rate if stamps is None else times_from_zero(stamps[k], len(x)),
-                name=names[k],
-                seen=x[:, shown],
-                afterwards=None
-                if live.cyclic or np.isnan(x).any()
-                else _final_phases(live, trials[k]),
-                body=bodies[k],
+        running = []
+        for k, (x, phases) in enumerate(zip(seen, tracked, strict=True)):
+            stamps_of_trial = None if stamps is None else stamps[k]
+            times_of_trial = times_from_zero(stamps_of_trial, len(x), live.frame_rate)
+            left, afterwards = action.times_left(phases, times_of_trial), None
+            if not live.cyclic and not np.isnan(x).any():
+                afterwards = _final_phases(live, trials[k])
+            running.append(
+                RunningTrial(
+                    phases, times_of_trial, left, names[k], x[:, shown], afterwards, bodies[k]
+                )
             )
-            for k, (x, phase) in enumerate(zip(seen, phases, strict=True))
-        ]
         known_units = units_of_columns(trials[0])
         labels = [feature_names[k] for k in shown]
-        display = cls(
+        return cls(
             action,
             running,
-            features=labels_of_signals(labels, known_units, ylabel, units),
-            skeleton=skeleton,
-            unit="frames" if live.frame_rate is None else "seconds",
-            xlabel=xlabel,
-        )
-        return display.plot(ax, frame=frame, azimuth=azimuth)
-
-    @classmethod
-    def from_predictions(
-        cls,
-        phases: LivePhase | Sequence[LivePhase],
-        n_frames: int,
-        *,
-        duration: float | None = None,
-        cyclic: bool = False,
-        xlabel: str | None = None,
-        frame: int | None = None,
-        ax: AxesLike | None = None,
-    ) -> Self:
-        """Draw phases that are known already, such as ``live.history``.
-
-        Parameters
-        ----------
-        phases : LivePhase, or list of LivePhase
-            The phases of one trial or several, of arrays (n_frames_i,); or of arrays
-            (n_frames, n_streams).
-        n_frames : int
-            The length of the clock, ``live.n_frames_``.
-        duration : float, default=None
-            The mean duration of the action in frames; None predicts nothing.
-        cyclic : bool, default=False
-            Whether the phases are those of cycles. The time axis then shows the last few of them.
-        xlabel : str, default=None
-            The label of time axes, in place of "time (frames)".
-        frame : int, default=None
-            As in `plot`.
-        ax : Axes or array-like of Axes, default=None
-            See `plot`.
-
-        Returns
-        -------
-        PhaseDisplay
-            The display, drawn.
-
-        Raises
-        ------
-        ValueError
-            If phases are of another class, or there is no such frame.
-        """
-        action = LearntAction(n_frames, cyclic, duration)
-        running = [
-            RunningTrial.of(action, phase, np.arange(float(len(phase.phase))), name=str(k))
-            for k, phase in enumerate(_as_list_of_phases(phases))
-        ]
-        return cls(action, running, xlabel=xlabel).plot(ax, frame=frame)
+            labels_of_signals(labels, known_units, ylabel, units),
+            skeleton,
+            xlabel or time_label(live.frame_rate),
+        ).plot(ax, frame=frame)
 
     def plot(
         self, ax: AxesLike | None = None, *, frame: int | None = None, azimuth: float = -60
@@ -326,7 +265,11 @@ class PhaseDisplay(MovingDisplay):
         return cells, (count * each, 2), (WIDTH, count * each * _ROW + 0.3)
 
     def _draw(self):
-        end = max(self.action.end_of(p) for p in self.trials)
+        last = self.action.n_frames - 1
+        # The latest time observed or predicted.
+        end = max(
+            (p.times + np.where(p.phases.phase < last, p.left, 0)).max() for p in self.trials
+        )
         by_row = np.array(self.axes_, dtype=object).reshape(len(self.trials), -1)
         curves_from = self._has_bodies() + 1
         self.rows_ = []
@@ -336,7 +279,7 @@ class PhaseDisplay(MovingDisplay):
             axes[0].set_title(fill(p.name, _LINE_LENGTH), fontsize="medium", parse_math=False)
             for axis in axes[curves_from:]:
                 axis.set_xlim(0, 1.02 * end or 1.0)
-                axis.set_xlabel(self.xlabel or TIME_LABELS[self.unit])
+                axis.set_xlabel(self.xlabel)
             row.show(self._time)
         # One legend for all curves.
         for axis in by_row[0, curves_from : curves_from + 2]:
@@ -346,24 +289,6 @@ class PhaseDisplay(MovingDisplay):
         time = share * max(p.times[-1] for p in self.trials)
         for row in self.rows_:
             row.show(time)
-
-
-def _as_list_of_phases(phases) -> list[LivePhase]:
-    """A list of LivePhase of arrays (n_frames_i,); streams side by side are separated."""
-    listed = [phases] if isinstance(phases, LivePhase) else phases
-    if not isinstance(listed, list) or not all(isinstance(of, LivePhase) for of in listed):
-        raise ValueError(
-            "phases must be a LivePhase of arrays, such as live.history, or a list of them, such "
-            f"as live.track(X) gives; got {phases!r:.80}."
-        )
-    if len(listed) == 1 and np.ndim(listed[0].phase) == 2:
-        (many,) = listed
-        streams = range(many.phase.shape[1])
-        return [
-            each_value(many, lambda values, n=n: None if values is None else values[:, n])
-            for n in streams
-        ]
-    return listed
 
 
 def _final_phases(live, x):
@@ -384,7 +309,7 @@ def _spread(live, training):
 
 
 class LearntAction(NamedTuple):
-    """The learnt action, and what it predicts of a running trial.
+    """The learnt action.
 
     Attributes
     ----------
@@ -392,19 +317,20 @@ class LearntAction(NamedTuple):
         The length of the clock.
     cyclic : bool
         Whether it is a cycle.
-    duration : float or None
+    duration : float
         The mean duration in the unit of the times.
-    mean, spread : ndarray (P, n_shown), or None
+    mean : ndarray, shape (P, n_shown)
+    spread : ndarray (P, n_shown), or None
     body : ndarray (P, n_joints, n_dims), or None
         The mean body.
     """
 
     n_frames: int
-    cyclic: bool = False
-    duration: float | None = None
-    mean: np.ndarray | None = None
-    spread: np.ndarray | None = None
-    body: np.ndarray | None = None
+    cyclic: bool
+    duration: float
+    mean: np.ndarray
+    spread: np.ndarray | None
+    body: np.ndarray | None
 
     def interpolate(self, phase, values):
         """Values at the frames of the clock, interpolated to phases."""
@@ -413,34 +339,13 @@ class LearntAction(NamedTuple):
         there = np.stack([np.interp(phase, clock, column) for column in flat.T], axis=-1)
         return there.reshape(*np.shape(phase), *values.shape[1:])
 
-    def phase_ahead(self, phase, rate):
-        """The phase a tenth of the duration later at this rate; of a cycle maybe in the next."""
-        last = self.n_frames - 1
-        ahead = phase + _AHEAD * last * rate
-        return ahead if self.cyclic else min(ahead, last)
-
-    def times_left(self, phases, cycles, times):
+    def times_left(self, phases, times):
         """The time left at every frame, as `OnlineSynchronizer.time_left` estimates it."""
-        if self.duration is None:
-            return np.zeros(len(times))
         course, out = Course(self.n_frames, self.duration, self.cyclic), []
-        for now in zip(times, phases, cycles, strict=True):
+        for now in zip(times, phases.phase, phases.cycle, strict=True):
             course.follow(*map(np.atleast_1d, now))
             out.append(course.time_left()[0])
         return np.array(out)
-
-    def end_of(self, trial):
-        """The latest time observed or predicted of a trial."""
-        times = trial.times
-        expected = times + np.where(trial.phase < self.n_frames - 1, trial.left, 0)
-        return max(times[-1], expected.max())
-
-    def predict(self, phase, now, left):
-        """The times and the phases of the rest, (n_points,) each; empty at the end."""
-        last = self.n_frames - 1
-        if self.duration is None or phase >= last:
-            return np.empty((2, 0))
-        return now + np.linspace(0, left, _N_POINTS), np.linspace(phase, last, _N_POINTS)
 
 
 class RunningTrial(NamedTuple):
@@ -448,41 +353,26 @@ class RunningTrial(NamedTuple):
 
     Attributes
     ----------
-    phase, rate, confidence : ndarray, shape (n_frames,)
-    lower, upper : ndarray (n_frames,), or None
-        The bounds of the phases.
-    cycle : ndarray of int, shape (n_frames,)
+    phases : LivePhase
+        Of arrays (n_frames,).
     times : ndarray, shape (n_frames,)
         The first time is 0.
     left : ndarray, shape (n_frames,)
         The time left.
     name : str
-    seen : ndarray (n_frames, n_shown), or None
+    seen : ndarray, shape (n_frames, n_shown)
     afterwards : ndarray (n_frames,), or None
         The phases as they are known at the end.
     body : ndarray (n_frames, n_joints, n_dims), or None
     """
 
-    phase: np.ndarray
-    rate: np.ndarray
-    confidence: np.ndarray
-    lower: np.ndarray | None
-    upper: np.ndarray | None
-    cycle: np.ndarray
+    phases: LivePhase
     times: np.ndarray
     left: np.ndarray
     name: str
-    seen: np.ndarray | None = None
-    afterwards: np.ndarray | None = None
-    body: np.ndarray | None = None
-
-    @classmethod
-    def of(cls, action, phases, times, **others):
-        """That of a LivePhase at times from 0 on, with the time that is left of the action."""
-        values = [None if x is None else np.asarray(x, dtype=np.float64) for x in phases[:5]]
-        cycle = np.zeros(len(times), dtype=np.intp) if phases.cycle is None else phases.cycle
-        left = action.times_left(values[0], cycle, times)
-        return cls(*values, cycle, times, left, **others)
+    seen: np.ndarray
+    afterwards: np.ndarray | None
+    body: np.ndarray | None
 
 
 class TrialRow:
@@ -523,8 +413,7 @@ class TrialRow:
         self.confidence = _empty_area(axis, grey, 0.75, "confidence")
         self.afterwards = None
         trial, percent = self._trial, 100 / (self._action.n_frames - 1)
-        label = _label("90 % band", trial.lower)
-        self.interval = _empty_area(axis, blue, _INTERVAL_OPACITY, label)
+        self.interval = _empty_area(axis, blue, _INTERVAL_OPACITY, "90 % band")
         if trial.afterwards is not None:
             ys = percent * trial.afterwards
             (self.afterwards,) = axis.plot(
@@ -535,8 +424,7 @@ class TrialRow:
                 linewidth=0.9,
                 linestyle="--",
             )
-        label = _label("predicted", self._action.duration)
-        (self.rest,) = axis.plot([], [], color=orange, linestyle=":", label=label)
+        (self.rest,) = axis.plot([], [], color=orange, linestyle=":", label="predicted")
         self.phase = front_line(axis, [], [], color=blue, label="phase")
         axis.set_ylim(0, 105)
         axis.set_ylabel("phase (%)")
@@ -547,30 +435,34 @@ class TrialRow:
         """Move to a time."""
         p, action = self._trial, self._action
         now = max(np.searchsorted(p.times, time, side="right") - 1, 0)
-        phase, rate, confidence = (x[now] for x in (p.phase, p.rate, p.confidence))
+        phase, rate, confidence, lower, upper, cycle = p.phases
         last, past = action.n_frames - 1, slice(now + 1)
-        ahead = action.phase_ahead(phase, rate)
-        rest = action.predict(phase, p.times[now], p.left[now])
-        number = p.cycle[now] if action.cyclic else None
-        self.dial.show(phase / last, ahead / last, rate, confidence, number)
+        ahead = phase[now] + _AHEAD * last * rate[now]
+        # Of a cycle it may be in the next one.
+        ahead = ahead if action.cyclic else min(ahead, last)
+        number = cycle[now] if action.cyclic else None
+        self.dial.show(phase[now] / last, ahead / last, rate[now], confidence[now], number)
         # The line has a gap where a cycle begins.
-        begins = 1 + np.flatnonzero(np.diff(p.cycle[past]))
-        line = p.times[past], 100 / last * p.phase[past]
+        begins = 1 + np.flatnonzero(np.diff(cycle[past]))
+        line = p.times[past], 100 / last * phase[past]
         self.phase.set_data(*(np.insert(values, begins, np.nan) for values in line))
-        _fill_area(self.confidence, p.times[past], 0, 100 * p.confidence[past])
-        if p.lower is not None:
-            lower, upper = (100 / last * bound[past] for bound in (p.lower, p.upper))
-            _fill_area(self.interval, p.times[past], lower, upper, begins)
-        if action.cyclic and action.duration is not None:
+        _fill_area(self.confidence, p.times[past], 0, 100 * confidence[past])
+        bounds_so_far = (100 / last * bound[past] for bound in (lower, upper))
+        _fill_area(self.interval, p.times[past], *bounds_so_far, begins)
+        if action.cyclic:
             stop = p.times[now] + action.duration
             for axis in self._time_axes:
                 axis.set_xlim(max(0, stop - _N_CYCLES * action.duration), stop)
-        self.rest.set_data(rest[0], 100 / last * rest[1])
+        # Nothing is predicted at the end.
+        n_points = _N_POINTS if phase[now] < last else 0
+        times = p.times[now] + np.linspace(0, p.left[now], n_points)
+        phases = np.linspace(phase[now], last, n_points)
+        self.rest.set_data(times, 100 / last * phases)
         if self.body is not None:
             ahead = ahead % last if action.cyclic else ahead
             self.body.show([self._bodies[now]], [action.interpolate(ahead, self._mean)])
         for curve in self.curves:
-            curve.show(now, *rest)
+            curve.show(now, times, phases)
 
 
 class PhaseDial:
@@ -635,7 +527,8 @@ class FeaturePanel:
         self._times, self._seen = trial.times, trial.seen[:, k]
         self._action, self._k = action, k
         blue, orange = COLORS["trial"], COLORS["mean"]
-        self.band = _empty_area(axis, COLORS["envelope"], 0.35, _label("90 % band", action.spread))
+        label = "_nolegend_" if action.spread is None else "90 % band"
+        self.band = _empty_area(axis, COLORS["envelope"], 0.35, label)
         (self.to_come,) = axis.plot(
             self._times,
             self._seen,
@@ -667,11 +560,6 @@ class FeaturePanel:
         if self._action.spread is not None:
             half_width = _BAND * self._action.interpolate(phases, self._action.spread[:, self._k])
             _fill_area(self.band, times, mean - half_width, mean + half_width)
-
-
-def _label(text, value):
-    """A label in a legend; none for an unknown value."""
-    return text if value is not None else "_nolegend_"
 
 
 def _empty_area(axis, color, alpha, label):

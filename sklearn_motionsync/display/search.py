@@ -29,7 +29,7 @@ _MAX_PANELS = 12
 class SearchDisplay(Display):
     """The hits of a search along takes: their times, scores, and the threshold.
 
-    Use `from_estimator`, or `from_predictions` with the result of `find_trials`.
+    Use `from_estimator`.
 
     Parameters
     ----------
@@ -103,55 +103,22 @@ class SearchDisplay(Display):
         -------
         SearchDisplay
             The display, drawn.
-        """
-        _, origin = find_trials(pattern, X, threshold=None, **params)
-        return cls.from_predictions(origin, X, segments=segments, xlabel=xlabel, ax=ax)
-
-    @classmethod
-    def from_predictions(
-        cls,
-        origin: pd.DataFrame,
-        X: TrialsLike,
-        *,
-        segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
-        xlabel: str | None = None,
-        ax: AxesLike | None = None,
-    ) -> Self:
-        """Draw the result of `find_trials`.
-
-        Parameters
-        ----------
-        origin : DataFrame
-            The second result of `find_trials`.
-        X : takes
-            The takes that were searched.
-        segments : DataFrame or list of (take, start, stop), default=None
-            True segments of the action, by the labels of the takes.
-        xlabel : str, default=None
-            The label of the time of the takes, in place of "frame of the take".
-        ax : Axes or array-like of Axes, default=None
-            See `plot`.
-
-        Returns
-        -------
-        SearchDisplay
-            The display, drawn.
 
         Raises
         ------
         ValueError
-            If hits or segments are of other takes.
+            If segments are of other takes; or as from `find_trials`.
         """
+        _, origin = find_trials(pattern, X, threshold=None, **params)
         takes = as_trials(X)
         lengths = dict(zip(labels_of(takes)[0], map(len, takes), strict=True))
         true = None
         if segments is not None:
             true = pd.DataFrame(segments, columns=["take", "start", "stop"])
-        for name, table in (("origin", origin), ("segments", true)):
-            unknown = [] if table is None else [t for t in table["take"] if t not in lengths]
+            unknown = [take for take in true["take"] if take not in lengths]
             if unknown:
                 raise ValueError(
-                    f"{name} names the take {unknown[0]!r}; the takes are {list(lengths)[:8]}."
+                    f"segments names the take {unknown[0]!r}; the takes are {list(lengths)[:8]}."
                 )
         return cls(origin, lengths, true, xlabel).plot(ax)
 

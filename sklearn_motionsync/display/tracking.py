@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import fill
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -20,10 +20,10 @@ from ..live.members import Track
 from ..live.tracker import MotionTracker
 from ..matching.counting import runs_of
 from .arguments import (
-    TIME_LABELS,
     as_frames,
     as_names,
     labels_of_signals,
+    time_label,
     times_from_zero,
 )
 from .base import COLORS, WIDTH, AxesLike, Display, empty_lists, legend_above
@@ -49,37 +49,36 @@ class TrackingDisplay(Display):
 
     One panel a feature: what was observed, the estimate with the band that contains 90 %, and the
     true course if it is known. Grey are times at which the feature was hidden, hatched those at
-    which the tracker was lost. Below are phase and rate. Make one with `from_estimator` or
-    `from_predictions`; `strip` draws the bodies.
+    which the tracker was lost. Below are phase and rate. Use `from_estimator`; `strip` draws the
+    bodies.
 
     Parameters
     ----------
     track : Track
         The track of one take.
-    truth : array-like, shape (n_frames, n_features), default=None
+    truth : ndarray (n_frames, n_features), or None
         The true features.
-    observed : array-like, shape (n_frames, n_features), default=None
+    observed : ndarray, shape (n_frames, n_features)
         The observed features, NaN where they were hidden.
-    times : array-like, shape (n_frames,), default=None
-        The times of the frames; by default frame numbers.
-    n_frames : int, default=None
-        The length of the clock. The phase is then in per cent, otherwise in frames.
-    names : list of str, default=None
-        The names of all features.
-    unit : {"frames", "seconds"}, default="frames"
+    times : ndarray, shape (n_frames,)
+        The times of the frames; the first one is 0.
+    n_frames : int
+        The length of the clock.
+    names : list of str
+        The labels of all features.
+    shown : list of int
+        The features that are drawn.
+    unit : {"frames", "seconds"}
         The unit of the times.
-    features : int, str or list of them, default=None
-        Those that are drawn, by index or name; by default those of the features hidden at any time,
-        or of all if none was, whose estimates vary most, at most four.
-    xlabel : str, default=None
-        The label of the time axis, in place of that of the unit.
+    xlabel : str
+        The label of the time axis.
 
     Attributes
     ----------
     axes_ : list of Axes
         One a feature, then those of the phase and the rate.
     estimates_, truths_, observed_ : list of Line2D
-        One a feature; empty if unknown.
+        One a feature; no true ones if they are unknown.
     bands_ : list of PolyCollection
         One a feature.
     hidden_, lost_ : list of list of Polygon
@@ -103,25 +102,19 @@ class TrackingDisplay(Display):
     """
 
     track: Track
-    truth: TrialLike | None = None
-    observed: TrialLike | None = None
-    times: ValuesLike | None = None
-    n_frames: int | None = None
-    names: Sequence[str] | None = None
-    unit: Literal["frames", "seconds"] = "frames"
-    features: Features | None = None
-    xlabel: str | None = None
+    truth: np.ndarray | None
+    observed: np.ndarray
+    times: np.ndarray
+    n_frames: int
+    names: Sequence[str]
+    shown: Sequence[int]
+    unit: Literal["frames", "seconds"]
+    xlabel: str
 
-    def __post_init__(self):
-        shape = np.shape(self.track.poses)
-        self.truth, self.observed = (
-            None if x is None else np.asarray(x, dtype=np.float64)
-            for x in (self.truth, self.observed)
-        )
-        self.times = times_from_zero(self.times, shape[0])
-        self.names = [f"x{k}" for k in range(shape[1])] if self.names is None else self.names
-        nothing = np.zeros(shape, dtype=bool)
-        self.hidden = nothing if self.observed is None else np.isnan(self.observed)
+    @property
+    def hidden(self) -> np.ndarray:
+        """Where features were hidden, (n_frames, n_features)."""
+        return np.isnan(self.observed)
 
     def __repr__(self):
         n_frames, n_features = self.hidden.shape
@@ -179,10 +172,6 @@ class TrackingDisplay(Display):
         ------
         ValueError
             As from ``estimator.track``; or if there is no such feature.
-
-        See Also
-        --------
-        from_predictions : Draws what ``estimator.smooth`` found, or a track from projections.
         """
         if not isinstance(estimator, MotionTracker):
             raise ValueError(f"Give a MotionTracker, got {type(estimator).__name__}.")
@@ -198,69 +187,35 @@ class TrackingDisplay(Display):
             raise ValueError(
                 f"The truth must have the shape {(n_frames, n_features)}, got {np.shape(truth)}."
             )
-        rate = 1.0 if estimator.frame_rate is None else estimator.frame_rate
         if names is None:
             names = names_of_features(None, estimator, n_features)
         names = as_names(names, n_features, "names", "features")
-        chosen = None if features is None else choose_features(features, names)
+        observed, frame_rate = np.asarray(X, dtype=np.float64), estimator.frame_rate
+        if features is None:
+            hidden = np.isnan(observed).any(axis=0)
+            candidates = np.flatnonzero(hidden if hidden.any() else ~hidden)
+            variance = np.var(track.poses[:, candidates], axis=0)
+            shown = candidates[np.argsort(-variance, kind="stable")][:_N_FEATURES].tolist()
+        else:
+            shown = choose_features(features, names)
         return cls(
             track,
-            truth=truth,
-            observed=X,
-            times=np.arange(n_frames) / rate if times is None else times,
-            n_frames=estimator.n_frames_,
-            names=labels_of_signals(names, units_of_columns(X), units=units),
-            unit="frames" if estimator.frame_rate is None else "seconds",
-            features=chosen,
-            xlabel=xlabel,
+            None if truth is None else np.asarray(truth, dtype=np.float64),
+            observed,
+            times_from_zero(times, n_frames, frame_rate),
+            estimator.n_frames_,
+            labels_of_signals(names, units_of_columns(X), units=units),
+            shown,
+            "frames" if frame_rate is None else "seconds",
+            xlabel or time_label(frame_rate),
         ).plot(ax)
 
-    @classmethod
-    def from_predictions(cls, track: Track, *, ax: AxesLike | None = None, **known: Any) -> Self:
-        """Draw a track that is known already.
-
-        Parameters
-        ----------
-        track : Track
-            The track of one take.
-        ax : Axes or array-like of Axes, default=None
-            See `plot`.
-        **known : dict
-            Further parameters of the class.
-
-        Returns
-        -------
-        TrackingDisplay
-            The display, drawn.
-
-        Raises
-        ------
-        ValueError
-            If ``track`` is not the track of one take.
-        """
-        if not isinstance(track, Track) or np.ndim(track.poses) != 2:
-            got = "that of one frame" if isinstance(track, Track) else type(track).__name__
-            raise ValueError(
-                f"track must be the Track of one take, as from MotionTracker.track; got {got}. Of "
-                "a list of them give one."
-            )
-        return cls(track, **known).plot(ax)
-
-    def _shown(self):
-        """The features that are drawn, by index."""
-        if self.features is not None:
-            return choose_features(self.features, self.names)
-        variance = np.var(self.track.poses, axis=0)
-        hidden = self.hidden.any(axis=0)
-        candidates = np.flatnonzero(hidden if hidden.any() else ~hidden)
-        return candidates[np.argsort(-variance[candidates], kind="stable")][:_N_FEATURES]
-
     def _layout(self):
-        count = len(self._shown()) + 2
+        count = len(self.shown) + 2
         return [(i, 0) for i in range(count)], (count, 1), (WIDTH, _PANEL * count + 0.6)
 
     def _draw(self):
-        shown = self._shown()
+        shown = self.shown
         self.estimates_, self.bands_, self.truths_, self.observed_ = empty_lists(4)
         for axis, k in zip(self.axes_, shown, strict=False):
             self._draw_feature(axis, k)
@@ -292,10 +247,9 @@ class TrackingDisplay(Display):
             ]
             for axis in self.axes_
         ]
-        phase = "phase (frame)" if self.n_frames is None else "phase (%)"
         names = [fill(self.names[k], _LINE_LENGTH) for k in shown]
-        time, ends = self.xlabel or TIME_LABELS[self.unit], (0, np.ravel(self.times)[-1] or 1.0)
-        self._label_axes(self.axes_, [*names, phase, "rate"], time, ends=ends)
+        ylabels, ends = [*names, "phase (%)", "rate"], (0, self.times[-1] or 1.0)
+        self._label_axes(self.axes_, ylabels, self.xlabel, ends=ends)
         for axis in self.axes_:
             axis.tick_params(labelbottom=axis is self.axes_[-1])
             axis.yaxis.label.set_fontsize("small")
@@ -310,7 +264,6 @@ class TrackingDisplay(Display):
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
     ) -> SkeletonDisplay:
         """Draw estimated bodies at some frames, before the true ones; hidden limbs are violet.
 
@@ -321,8 +274,6 @@ class TrackingDisplay(Display):
         frames : int or list of int, default=6
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
-            As for `SkeletonDisplay.plot`.
-        azimuth : float, default=-60
             As for `SkeletonDisplay.plot`.
 
         Returns
@@ -339,14 +290,12 @@ class TrackingDisplay(Display):
         marked = [bones_of_limbs(limbs[self.hidden[frame]], skeleton) for frame in shown]
         titles = [f"frame {k}" for k in shown]
         if self.unit == "seconds":
-            titles = [f"{time:.1f} s" for time in np.asarray(self.times)[shown]]
+            titles = [f"{time:.1f} s" for time in self.times[shown]]
         behind = None
         if self.truth is not None:
             behind = poses_at(shown, [invert_poses(self.truth, cosines, skeleton)])
         scenes = poses_at(shown, [estimate])
-        return SkeletonDisplay(scenes, skeleton, titles, marked=marked, behind=behind).plot(
-            ax, azimuth=azimuth
-        )
+        return SkeletonDisplay(scenes, skeleton, titles, marked=marked, behind=behind).plot(ax)
 
     def _draw_feature(self, axis, k):
         estimate = self.track.poses[:, k]
@@ -362,16 +311,12 @@ class TrackingDisplay(Display):
             truth = self.truth[:, k]
             self.truths_ += axis.plot(times, truth, color=orange, linewidth=1.2, label="truth")
         self.estimates_ += axis.plot(times, estimate, color=blue, linewidth=1.8, label="estimate")
-        if self.observed is not None:
-            seen = self.observed[:, k]
-            self.observed_ += axis.plot(times, seen, ".", color=black, markersize=2.5, label="seen")
+        seen = self.observed[:, k]
+        self.observed_ += axis.plot(times, seen, ".", color=black, markersize=2.5, label="seen")
 
     def _draw_progress(self, upper, lower):
-        phases = np.asarray(self.track.phases)
-        if self.n_frames is not None:
-            phases = 100 * phases / (self.n_frames - 1)
-            upper.set_ylim(-3, 103)
-        blue = COLORS["trial"]
+        phases, blue = 100 * self.track.phases / (self.n_frames - 1), COLORS["trial"]
+        upper.set_ylim(-3, 103)
         (self.phase_,) = upper.plot(self.times, phases, color=blue)
         lower.axhline(1, color=COLORS["envelope"], linewidth=1, linestyle="--")
         (self.rate_,) = lower.plot(self.times, self.track.rates, color=blue)

@@ -8,7 +8,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import PhaseDisplay
-from sklearn_motionsync.live import LivePhase, OnlineSynchronizer
+from sklearn_motionsync.live import OnlineSynchronizer
 
 BUNCH = make_bending(8, n_frames=60, n_actors=2, random_state=0)
 COSINES = DirectionCosines(BUNCH.skeleton).fit(BUNCH.data[:6])
@@ -81,7 +81,8 @@ def test_prediction_lasts_as_long_as_time_left(live, display):
 
 def test_bones_are_at_the_joints(live, display):
     """In the view from the left, z points to the left and y up."""
-    display = PhaseDisplay.from_estimator(live, X[6], body=COSINES, frame=FRAME, azimuth=90)
+    display = PhaseDisplay.from_estimator(live, X[6], body=COSINES)
+    display.plot(display.axes_, frame=FRAME, azimuth=90)
     joints = COSINES.inverse_transform(X[6])[FRAME].reshape(-1, 3)
     skeleton = COSINES.skeleton
     knee, ankle = (skeleton.joints.index(f"left_{name}") for name in ("knee", "ankle"))
@@ -99,14 +100,14 @@ def test_other_frames_and_animation(live, display):
     np.testing.assert_allclose(times, [(len(x) - 1) / RATE for x in X[6:]])
     assert len(display.rows_[0].rest.get_xdata()) == 0
     assert shown is not display.rows_[0]
-    display = PhaseDisplay.from_predictions(live.track(X[6:7]), live.n_frames_)
+    display = PhaseDisplay.from_estimator(live, X[6:7])
     animation = display.animate(seconds=0.2, fps=10)
     assert animation.to_jshtml().count("data:image") == 2
     assert len(display.rows_[0].phase.get_xdata()) == len(X[6])
 
 
 def test_unknown_values_are_not_drawn(live):
-    """Gaps, streams, time stamps, univariate rows, and phases alone."""
+    """Gaps, time stamps, tables, and univariate rows."""
     x = X[6].copy()
     x[10:20, :5] = np.nan
     times = np.arange(len(x)) / 25 + 3
@@ -118,12 +119,6 @@ def test_unknown_values_are_not_drawn(live):
     assert np.isnan(row.curves[0].seen.get_ydata()[10:20]).all()
     assert row.phase.get_xdata()[-1] == pytest.approx((len(x) - 1) / 25)
     assert display.axes_[1].get_xlabel() == "since the start"
-    live.reset()
-    for frames in zip(X[6], X[7], strict=False):
-        live.step(frames)
-    streams = PhaseDisplay.from_predictions(live.history, live.n_frames_)
-    assert repr(streams) == "PhaseDisplay(2 trials)"
-    live.reset()
     table = pd.concat([pd.DataFrame(x) for x in X], keys=list("abcdefgh"))
     rows = PhaseDisplay.from_estimator(live, table).rows_
     assert [row.axes[0].get_title() for row in rows] == list("abcd")
@@ -161,16 +156,11 @@ def test_titles_and_predictions_fit_into_the_figure(live):
     extent = row.axes[0].title.get_window_extent()
     assert extent.x0 >= 0
     assert extent.y1 <= display.figure_.bbox.y1
-    # A trial that has stopped is expected to need half of the remaining time.
-    stops = LivePhase(np.full(90, 25), np.zeros(90), np.ones(90))
-    (row,) = PhaseDisplay.from_predictions(stops, 51, duration=60).rows_
-    assert row.rest.get_xdata()[-1] == 89 + 15
-    assert row.axes[1].get_xlim()[1] > 89 + 15
-    # Bounds are not drawn where they are unknown.
-    (row,) = PhaseDisplay.from_predictions(LivePhase([0], [1], [1]), 51).rows_
-    assert row.interval.get_paths() == []
-    two = LivePhase(*np.ones((3, 9, 2)))
-    assert len(PhaseDisplay.from_predictions(two, 51).rows_) == 2
+    # A trial that stops has not ended, and the axis holds the time that it still needs.
+    stops = np.concatenate([X[6][:30], np.repeat(X[6][30:31], 40, axis=0)])
+    (row,) = PhaseDisplay.from_estimator(live, stops).rows_
+    assert row.rest.get_xdata()[-1] > 69 / RATE
+    assert row.axes[1].get_xlim()[1] > row.rest.get_xdata()[-1]
 
 
 def test_cycles_are_drawn_round_by_round():
@@ -204,8 +194,6 @@ def test_cycles_are_drawn_round_by_round():
     stop = times[near_end] + live.duration_ / 100
     for axis in row.axes[1:]:
         assert axis.get_xlim() == pytest.approx((max(0, stop - 5 * live.duration_ / 100), stop))
-    (other,) = PhaseDisplay.from_predictions(found, 50, frame=frame, cyclic=True).rows_
-    np.testing.assert_array_equal(other.phase.get_ydata(), ys)
 
 
 def test_a_second_attempt_is_another_line(live):
@@ -229,5 +217,3 @@ def test_from_estimator_refuses(live):
             PhaseDisplay.from_estimator(live, X, **change)
     with pytest.raises(ValueError, match="Found 0 trials"):
         PhaseDisplay.from_estimator(live, [])
-    with pytest.raises(ValueError, match="phases must be a LivePhase"):
-        PhaseDisplay.from_predictions([1], 50)

@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import to_trials
 from sklearn_motionsync.display import SearchDisplay
-from sklearn_motionsync.takes import find_trials
 
 matplotlib.use("Agg")
 
@@ -30,16 +29,14 @@ def test_hits_have_their_times_and_others_are_grey():
 def test_each_take_has_a_panel():
     table = pd.concat([pd.DataFrame(TAKE), pd.DataFrame(TAKE[:80])], keys=["ann", "bob"])
     takes = to_trials(table.rename_axis(["take", "frame"]))
-    _, origin = find_trials(pd.DataFrame(WAVE), takes)
-    display = SearchDisplay.from_predictions(origin, takes, xlabel="at 50 Hz")
+    display = SearchDisplay.from_estimator(pd.DataFrame(WAVE), takes, xlabel="at 50 Hz")
     assert display.axes_[-1].get_xlabel() == "at 50 Hz"
     assert [axis.get_title() for axis in display.axes_] == ["take ann", "take bob"]
     assert [axis.get_xlim()[1] for axis in display.axes_] == [len(TAKE), 80]
 
 
 def test_a_search_without_hits_is_drawn():
-    still = np.zeros((100, 2))
-    display = SearchDisplay.from_predictions(find_trials(WAVE, still)[1], still)
+    display = SearchDisplay.from_estimator(WAVE, np.zeros((100, 2)))
     assert repr(display) == "SearchDisplay(0 hits in 1 take)"
 
 

@@ -8,7 +8,7 @@ from sklearn.base import clone
 from sklearn_motionsync import DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import TrackingDisplay
-from sklearn_motionsync.live import MotionTracker, Track
+from sklearn_motionsync.live import MotionTracker
 
 BUNCH = make_bending(5, n_frames=24, random_state=0)
 COSINES = DirectionCosines(BUNCH.skeleton).fit(BUNCH.data)
@@ -59,19 +59,19 @@ def test_artists_agree_with_the_track_of_hidden_features(tracker, display):
 
 
 def test_lost_intervals_and_chosen_features(tracker):
-    track = tracker.smooth(X[4])
-    lost = np.zeros(len(track.lost), dtype=bool)
+    display = TrackingDisplay.from_estimator(tracker, X[4], features=[1, 36])
+    lost = np.zeros(len(X[4]), dtype=bool)
     lost[[3, 4, 9]] = True
-    track = Track(*track[:5], lost)
-    display = TrackingDisplay.from_predictions(track, features=[1, 36])
+    display.track = display.track._replace(lost=lost)
+    display.plot(display.axes_)
     assert [len(spans) for spans in display.lost_] == [2, 2, 2, 2]
     assert [len(spans) for spans in display.hidden_] == [0, 0, 0, 0]
-    assert (display.truths_, display.observed_) == ([], [])
-    assert [axis.get_ylabel() for axis in display.axes_] == ["x1", "x36", "phase (frame)", "rate"]
+    assert display.truths_ == []
+    assert [axis.get_ylabel() for axis in display.axes_] == ["x1", "x36", "phase (%)", "rate"]
     axes = display.axes_
     assert display.plot(axes).axes_ == axes
     legend = [text.get_text() for text in axes[0].get_legend().get_texts()]
-    assert legend == ["90 %", "estimate", "lost"]
+    assert legend == ["90 %", "estimate", "seen", "lost"]
 
 
 def test_a_single_frame_long_names_and_shared_axes(tracker):
@@ -80,12 +80,13 @@ def test_a_single_frame_long_names_and_shared_axes(tracker):
     label = display.axes_[0].yaxis.label
     display.figure_.draw_without_rendering()
     assert label.get_window_extent().height < display.figure_.bbox.height / 6
-    track = tracker.track(SEEN)
+    display = TrackingDisplay.from_estimator(tracker, SEEN, features=0)
+    rates = display.track.rates
     _, axes = plt.subplots(3, 2, sharey="row")
-    for column, rates in zip(axes.T, (track.rates, 3 * track.rates), strict=True):
-        of_rates = Track(*track[:3], rates, *track[4:])
-        TrackingDisplay.from_predictions(of_rates, features=0, ax=column)
-    assert axes[2, 0].get_ylim()[1] > 3 * track.rates.max()
+    for column, factor in zip(axes.T, (1, 3), strict=True):
+        display.track = display.track._replace(rates=factor * rates)
+        display.plot(column)
+    assert axes[2, 0].get_ylim()[1] > 3 * rates.max()
 
 
 def test_bodies_of_a_strip(display):
@@ -115,9 +116,6 @@ def test_times_units_and_tables(tracker):
     assert display.phase_.get_xdata()[-1] == times[-1]
     assert display.axes_[0].get_ylabel() == "pelvis_height\n(legs)"
     assert display.axes_[-1].get_xlabel() == "since the start (s)"
-    track = tracker.smooth([SEEN])[0]
-    drawn = TrackingDisplay.from_predictions(track, observed=SEEN, features=HIDDEN[0])
-    np.testing.assert_array_equal(drawn.estimates_[0].get_ydata(), track.poses[:, HIDDEN[0]])
 
 
 def test_from_estimator_refuses(tracker, display):
@@ -133,5 +131,3 @@ def test_from_estimator_refuses(tracker, display):
         TrackingDisplay.from_estimator(tracker, SEEN, times=np.arange(len(SEEN))[::-1])
     with pytest.raises(ValueError, match="cosines must be DirectionCosines, got int"):
         display.strip(1)
-    with pytest.raises(ValueError, match="track must be the Track of one take"):
-        TrackingDisplay.from_predictions([display.track])
