@@ -68,7 +68,7 @@ class SkeletonDisplay(MovingDisplay):
 
     A skeleton may lack landmarks. Where a landmark is the mean of joints, limbs are drawn between
     the landmarks; the joints of a skeleton without bones are drawn as points. Positions in a plane
-    are drawn as the camera saw them, whatever the ``azimuth``.
+    are drawn as the camera saw them, whatever the ``azimuth`` of `plot`.
 
     Parameters
     ----------
@@ -135,7 +135,6 @@ class SkeletonDisplay(MovingDisplay):
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
     ) -> Self:
         """Draw poses of one trial, or of synchronised ones over each other.
 
@@ -150,8 +149,6 @@ class SkeletonDisplay(MovingDisplay):
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        azimuth : float, default=-60
-            See `plot`.
 
         Returns
         -------
@@ -165,7 +162,7 @@ class SkeletonDisplay(MovingDisplay):
         shown = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in shown]
         display = cls(poses_at(shown, bodies), skeleton, titles)
-        return display.plot(ax, azimuth=azimuth)
+        return display.plot(ax)
 
     @classmethod
     def from_trials(
@@ -177,7 +174,6 @@ class SkeletonDisplay(MovingDisplay):
         names: Sequence[str] | None = None,
         ax: AxesLike | None = None,
         at: float = 0.0,
-        azimuth: float = -60,
     ) -> Self:
         """Draw trials side by side, each at its own pace, such as two subjects and a blend.
 
@@ -196,8 +192,6 @@ class SkeletonDisplay(MovingDisplay):
             See `plot`.
         at : float in [0, 1], default=0.0
             See `plot`.
-        azimuth : float, default=-60
-            See `plot`.
 
         Returns
         -------
@@ -215,7 +209,7 @@ class SkeletonDisplay(MovingDisplay):
             titles, recorded = ["as recorded", "aligned"], [float(len(x) - 1) for x in bodies]
             durations = [recorded, [float(np.median(recorded))] * len(bodies)]
         display = cls(scenes, skeleton, titles, durations=durations, labels=labels)
-        return display.plot(ax, at=at, azimuth=azimuth)
+        return display.plot(ax, at=at)
 
     @classmethod
     def from_estimator(
@@ -226,7 +220,6 @@ class SkeletonDisplay(MovingDisplay):
         trials: Sequence[int] | np.ndarray | None = None,
         ax: AxesLike | None = None,
         at: float = 0.0,
-        azimuth: float = -60,
         **params: Any,
     ) -> Self:
         """Draw trials as recorded above the same ones synchronised by a pipeline.
@@ -244,8 +237,6 @@ class SkeletonDisplay(MovingDisplay):
             See `plot`.
         at : float in [0, 1], default=0.0
             The moment that is drawn, as in `plot`.
-        azimuth : float, default=-60
-            The direction of view in degrees, as in `plot`.
         **params : dict
             Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
 
@@ -269,7 +260,6 @@ class SkeletonDisplay(MovingDisplay):
             names=[f"{i} (pattern)" if i == pattern else str(i) for i in trials],
             ax=ax,
             at=at,
-            azimuth=azimuth,
         )
 
     @classmethod
@@ -281,7 +271,6 @@ class SkeletonDisplay(MovingDisplay):
         n_samples: int = 12,
         random_state: RandomState = None,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
     ) -> Self:
         """Draw mean poses of a model, and random poses that it accepts (Fig. 4).
 
@@ -297,8 +286,6 @@ class SkeletonDisplay(MovingDisplay):
         random_state : int, RandomState instance or None, default=None
             Determines the random poses; None draws others each time.
         ax : Axes or array-like of Axes, default=None
-            See `plot`.
-        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -337,7 +324,7 @@ class SkeletonDisplay(MovingDisplay):
                 f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
-        return cls(scenes, skeleton, titles).plot(ax, azimuth=azimuth)
+        return cls(scenes, skeleton, titles).plot(ax)
 
     @classmethod
     def from_departures(
@@ -350,7 +337,6 @@ class SkeletonDisplay(MovingDisplay):
         limit: float | None = None,
         reference: TrialsLike | None = None,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
         **params: Any,
     ) -> Self:
         """Draw what is wrong with a trial: when, and with which limbs.
@@ -385,8 +371,6 @@ class SkeletonDisplay(MovingDisplay):
             One to five right trials of the same person, as for `find_departures`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        azimuth : float, default=-60
-            The direction of view in degrees, as in `plot`.
         **params : dict
             Further arguments of the synchronizer, such as ``keyframes``.
 
@@ -417,7 +401,7 @@ class SkeletonDisplay(MovingDisplay):
             reference=reference,
         )
         display = cls(scenes, skeleton, titles, marked=marked, behind=behind, heading=heading)
-        return display.plot(ax, azimuth=azimuth)
+        return display.plot(ax)
 
     def plot(self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float = -60) -> Self:
         """Draw.
