@@ -186,7 +186,7 @@ CALLS = {
     ),
     "SpreadScorer": lambda s: SpreadScorer()(s.sync, s.X, **s.params),
     "SynchronizationDisplay.from_estimator": lambda s: (
-        display.SynchronizationDisplay.from_estimator(s.sync, s.X, **s.params).times
+        display.SynchronizationDisplay.from_estimator(s.sync, s.X, **s.params).match.times
     ),
     "TimingChannel.fit": lambda s: s.fitted(TIMING).synchronizer_.pattern_,
     "TimingChannel.fit_transform": lambda s: clone(TIMING).fit_transform(cosines(s), **s.params),

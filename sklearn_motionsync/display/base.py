@@ -26,7 +26,6 @@ __all__ = [
     "AxesLike",
     "Display",
     "TimeAxis",
-    "clock_rate",
     "curves",
     "draw_keyframes",
     "empty_lists",
@@ -438,11 +437,6 @@ class TimeAxis:
         scale = self.clock[-1] / (len(self.clock) - 1)
         return frames if self.unit == "frames" else frames * scale
 
-    def offsets_of(self, match, coverage=None):
-        """The offsets of a match in the unit, and with a coverage the bounds of their intervals."""
-        offsets = match.offsets_in(self.unit, coverage=coverage)
-        return [offsets] if coverage is None else offsets
-
     def draw_keyframes(self, axes, named):
         """Draw the key-frames on the clock in panels, with their names in one of these."""
         if self.keyframes is None:
@@ -471,11 +465,6 @@ class TimeAxis:
             )
             for axis in axes
         ]
-
-
-def clock_rate(clock):
-    """Frames of the clock in a unit of time, such as a second."""
-    return (len(clock) - 1) / clock[-1]
 
 
 def offset_label(unit):

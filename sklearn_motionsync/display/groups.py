@@ -26,7 +26,6 @@ from .base import (
     AxesLike,
     Display,
     TimeAxis,
-    clock_rate,
     curves,
     draw_keyframes,
     empty_lists,
@@ -39,7 +38,7 @@ from .base import (
     text_of_keyframe,
 )
 
-__all__ = ["GroupCurves", "GroupDisplay", "NormDisplay", "display_of_groups"]
+__all__ = ["GroupCurves", "GroupDisplay", "NormDisplay"]
 
 # Signals that are shown when none are named; of more, the first few.
 _MOST = 6
@@ -118,13 +117,13 @@ class GroupDisplay(Display):
         Labels of the signals.
     feature_names : list of str
         Names of the signals, as in the table of clusters.
-    title : str, default=""
+    title : str
         The meaning of the bands, for the legend.
-    events : DataFrame, shape (n_people, n_events), default=None
+    events : DataFrame (n_people, n_events), or None
         Where the events of people are on the clock, in frames: lines and their spread.
-    comparison : GroupComparison, default=None
+    comparison : GroupComparison or None
         In the same unit: its clusters are bars.
-    pairs : bool, default=False
+    pairs : bool
         Whether people of all groups are the same, in the same order: their dots are joined.
 
     Attributes
@@ -165,10 +164,10 @@ class GroupDisplay(Display):
     axis: TimeAxis
     ylabels: Sequence[str]
     feature_names: Sequence[str]
-    title: str = ""
-    events: pd.DataFrame | None = None
-    comparison: GroupComparison | None = None
-    pairs: bool = False
+    title: str
+    events: pd.DataFrame | None
+    comparison: GroupComparison | None
+    pairs: bool
 
     def __repr__(self):
         return f"GroupDisplay({[group.label for group in self.groups]}, {self.feature_names})"
@@ -276,21 +275,53 @@ class GroupDisplay(Display):
             features=features,
             unit=unit,
         )
-        display = display_of_groups(
-            aligned,
-            y,
-            groups,
+        names, note = aligned.names, ""
+        chosen = list(range(len(names)))
+        if features is None and len(names) > _MOST:
+            chosen = choose_features(None, names)
+            note = f"{len(chosen)} of {len(names)} signals"
+        names = [names[i] for i in chosen]
+        if comparison is not None:
+            clusters = comparison.clusters
+            more = clusters[(clusters["what"] == "shape") & ~clusters["feature"].isin(names)]
+            if len(more):
+                note += f"{', ' if note else ''}differences also in "
+                note += ", ".join(dict.fromkeys(more["feature"]))
+        known_units = dict(zip(aligned.names, aligned.units, strict=True))
+        of_people = GroupsOfPeople.of(y, groups, len(aligned.curves))
+        # From the mean of all trials.
+        offsets = of_people.means(aligned.offsets - aligned.offsets.mean(axis=0))
+        shown = aligned.curves[:, :, chosen]
+        whom = "trials" if groups is None else "people"
+        title = _STATISTICS[statistic].format(whom=whom, share=100 * coverage)
+        of_groups = []
+        for label, (color, line), maker, curves_of_people, offsets_of_people in zip(
+            of_people.describe(groups is not None),
+            group_styles(of_people.labels).values(),
+            of_people.makers,
+            of_people.means(shown),
+            offsets,
+            strict=True,
+        ):
+            panels = np.concatenate(
+                [curves_of_people, offsets_of_people[:, :, np.newaxis]], axis=2
+            )
+            mean, half = band_of_mean(panels, statistic, coverage)
+            drawn = shown[maker.any(axis=0)] if trials else None
+            of_groups.append(
+                GroupCurves(mean, mean - half, mean + half, drawn, label, color, line)
+            )
+        return cls(
+            of_groups,
+            offsets,
+            TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel),
+            labels_of_signals(names, known_units, ylabel, units),
+            names,
+            f"{title}; {note}" if note else title,
+            _events_on_clock(events, aligned, of_people),
             comparison,
-            features=features,
-            statistic=statistic,
-            coverage=coverage,
-            trials=trials,
-            events=events,
-            ylabel=ylabel,
-            units=units,
-            xlabel=xlabel,
-        )
-        return display.plot(ax)
+            groups is not None and of_people.are_pairs,
+        ).plot(ax)
 
     def _layout(self):
         more = 0.6 + 0.2 * max(len(self.groups) - 2, 0) + 0.5 * (self.events is not None)
@@ -369,7 +400,8 @@ class GroupDisplay(Display):
         if self.events is not None:
             return self.events.mean().to_numpy()
         if self.comparison is not None and len(timing := self._clusters_of("timing")):
-            return timing["peak"].to_numpy() * clock_rate(self.axis.clock)
+            clock = self.axis.clock
+            return timing["peak"].to_numpy() * (len(clock) - 1) / clock[-1]
         return np.array([first_largest(np.concatenate(self.offsets).var(axis=0))], dtype=float)
 
     def _clusters_of(self, what, feature=None):
@@ -395,71 +427,6 @@ class GroupDisplay(Display):
             )
             self.clusters_.append(axis.add_collection(lines, autolim=False))
         return [lines for lines in self.clusters_ if len(lines.get_segments())]
-
-
-def display_of_groups(
-    aligned,
-    y,
-    groups,
-    comparison,
-    *,
-    features=None,
-    statistic="sd",
-    coverage=0.95,
-    trials=False,
-    events=None,
-    ylabel=None,
-    units=None,
-    xlabel=None,
-):
-    """The display of trials that are matched already: `AlignedCurves` of ``features``.
-
-    The others are those of `GroupDisplay.from_estimator`.
-    """
-    n, names, note = len(aligned.curves), aligned.names, ""
-    chosen = list(range(len(names)))
-    if features is None and len(names) > _MOST:
-        chosen = choose_features(None, names)
-        note = f"{len(chosen)} of {len(names)} signals"
-    names = [names[i] for i in chosen]
-    if comparison is not None:
-        clusters = comparison.clusters
-        more = clusters[(clusters["what"] == "shape") & ~clusters["feature"].isin(names)]
-        if len(more):
-            note += f"{', ' if note else ''}differences also in "
-            note += ", ".join(dict.fromkeys(more["feature"]))
-    default = dict(zip(aligned.names, aligned.units, strict=True))
-    ylabels = labels_of_signals(names, default, ylabel, units)
-    of_people = GroupsOfPeople.of(y, groups, n)
-    # From the mean of all trials.
-    offsets = of_people.means(aligned.offsets - aligned.offsets.mean(axis=0))
-    shown = aligned.curves[:, :, chosen]
-    whom = "trials" if groups is None else "people"
-    title = _STATISTICS[statistic].format(whom=whom, share=100 * coverage)
-    of_groups = []
-    for label, (color, line), maker, signals, offset in zip(
-        of_people.describe(groups is not None),
-        group_styles(of_people.labels).values(),
-        of_people.makers,
-        of_people.means(shown),
-        offsets,
-        strict=True,
-    ):
-        panels = np.concatenate([signals, offset[:, :, np.newaxis]], axis=2)
-        mean, half = band_of_mean(panels, statistic, coverage)
-        drawn = shown[maker.any(axis=0)] if trials else None
-        of_groups.append(GroupCurves(mean, mean - half, mean + half, drawn, label, color, line))
-    return GroupDisplay(
-        of_groups,
-        offsets,
-        TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel),
-        ylabels=ylabels,
-        feature_names=names,
-        title=f"{title}; {note}" if note else title,
-        events=_events_on_clock(events, aligned, of_people),
-        comparison=comparison,
-        pairs=groups is not None and of_people.are_pairs,
-    )
 
 
 def _events_on_clock(events, aligned, of_people):

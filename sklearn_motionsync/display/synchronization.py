@@ -311,11 +311,6 @@ class SynchronizationDisplay(Display):
         return super().plot(ax)
 
     @property
-    def times(self) -> np.ndarray:
-        """The warps."""
-        return self.match.times
-
-    @property
     def doubtful(self) -> np.ndarray | None:
         """Which trials are doubtful; None if the match does not tell, or without coverage."""
         tells = self.coverage is not None and self.match.intervals is not None
@@ -398,12 +393,13 @@ class SynchronizationDisplay(Display):
     def _draw_offsets(self, axis, clock, colors):
         """Draw offsets from their mean, and bands around them if the match tells intervals."""
         coverage = None if self.doubtful is None else self.coverage
-        offsets, *bounds = self.axis.offsets_of(self.match, coverage)
-        mean, bands = offsets.mean(axis=0), ""
-        if bounds:
-            lower, upper = (bound - mean for bound in bounds)
-            self.intervals_ = self._draw_intervals(axis, clock, lower, upper, colors)
+        offsets, bands = self.match.offsets_in(self.axis.unit, coverage=coverage), ""
+        if coverage is not None:
+            offsets, lower, upper = offsets
+            bounds = lower - offsets.mean(axis=0), upper - offsets.mean(axis=0)
+            self.intervals_ = self._draw_intervals(axis, clock, *bounds, colors)
             bands = f"shaded: {100 * self.coverage:g} % intervals"
+        mean = offsets.mean(axis=0)
         self.offsets_ = self._draw_trials(axis, [clock] * len(offsets), offsets - mean, colors)
         axis.axhline(0, color=COLORS["pattern"], linestyle="--", linewidth=1)
         second = "; ".join(filter(None, (bands, self._describe_doubtful("dotted: "))))

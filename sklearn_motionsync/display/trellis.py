@@ -96,10 +96,7 @@ class TrellisDisplay(Display):
         reached = route_to_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
         synchronizer, trials = reached.synchronizer, reached.trials
         space = synchronizer.disparity_space(trials, trial, **reached.params)
-        if reached.params:
-            warp = reached.match().offsets[trial]
-        else:
-            warp = synchronizer.match(trials.take([trial])).offsets[0]
+        warp = reached.match().offsets[trial]
         index = index_of_pattern(synchronizer, trials)
         names = ("pattern" if index is None else f"pattern {index}", f"trial {trial}")
         return cls(space, warp, names).plot(ax)

@@ -30,7 +30,7 @@ from ..display.base import (
     pyplot,
     text_of_label,
 )
-from ..display.groups import display_of_groups
+from ..display.groups import GroupDisplay
 from ..display.synchronization import SynchronizationDisplay
 from ..inputs.features import choose_features
 from ..inputs.types import (
@@ -169,8 +169,17 @@ def write_report(
         _add_signals(page, trials, features)
         _add_timing(page, trials)
         if comparison is not None:
-            display = display_of_groups(aligned, labels, groups, comparison, features=features)
-            _add_test(page, comparison, display.plot().figure_, not covariate)
+            display = GroupDisplay.from_estimator(
+                aligned.match,
+                X,
+                labels,
+                groups=groups,
+                signals=signals,
+                features=features,
+                comparison=comparison,
+                unit=unit,
+            )
+            _add_test(page, comparison, display.figure_, not covariate)
         _add_doubtful(page, trials)
         add_player_of(page, trials, X, params, skeleton)
     return page.write(path, "Aligned trials" if title is None else title)
