@@ -112,13 +112,7 @@ display.axes_[1].set_ylabel("right forearm\nupwards\n(cosine)")
 _ = display.figure_.suptitle("The estimate stays near the truth while limbs are hidden")
 
 # %%
-# The same as stick figures: hidden limbs are violet, the true body is pale.
-
-display = display.strip(cosines, frames=[14, 22, 36, 54])
-_ = display.figure_.suptitle("Hidden limbs (violet) follow the true body (pale)")
-
-# %%
-# The smoother, with what was seen and the truth beside it:
+# The same as stick figures, by the smoother, with what was seen and the truth beside it:
 
 hiding = DirectionCosines(known.skeleton, hidden="nan").fit(known.data)
 bodies = hiding.inverse_transform([seen[0], smoothed[0].poses, truth[0]])

@@ -16,11 +16,9 @@ from ..utils.pipelines import find_step, find_synchronizer, flat_steps, union_tr
 from .arguments import as_frames, as_index
 
 __all__ = [
-    "bones_of_limbs",
     "describe_departure",
     "draw_departures",
     "limb_departures",
-    "limb_of",
     "split_at_synchronizer",
 ]
 
@@ -57,15 +55,21 @@ def limb_departures(rows, n_frames, frames, skeleton):
     shown, stretches = _stretches(rows, frames, n_frames)
     titles, marked = [], []
     for frame, stretch in zip(shown, stretches, strict=True):
-        departing = [row for row in rows if _is_in(row, stretch)]
+        departing = [
+            row
+            for row in rows
+            if len(stretch) and row.first <= stretch[-1] and row.last >= stretch[0]
+        ]
         text = "no limb departs"
         if departing:
             # A panel has no room for more.
             text = describe_departure(departing[0])
             text = re.sub(r"moves (\S+) times as far", r"x \1", text)
         titles.append(f"frame {frame}\n{text}")
-        limbs = list(dict.fromkeys(row.limb for row in departing))
-        marked.append(bones_of_limbs(limbs, skeleton))
+        limbs = dict.fromkeys(row.limb for row in departing)
+        bones = [bone for limb in limbs for bone in _bones_of_limb(limb, skeleton)]
+        # Each once.
+        marked.append(list(dict.fromkeys(bones)))
     return shown, titles, marked
 
 
@@ -79,11 +83,6 @@ def describe_departure(row):
     if row.unit == "ratio":
         return f"{limb} moves {row.size:.1f} times as far"
     return f"{limb} {abs(row.size):.2f} {'higher' if row.size > 0 else 'lower'}"
-
-
-def _is_in(row, stretch):
-    """Whether a departure lies in one of some frames, which follow each other."""
-    return len(stretch) > 0 and row.first <= stretch[-1] and row.last >= stretch[0]
 
 
 def _stretches(rows, frames, n_frames):
@@ -103,18 +102,8 @@ def _stretches(rows, frames, n_frames):
     return shown, [np.flatnonzero(of_frame) for of_frame in near]
 
 
-def limb_of(feature):
-    """The limb of a feature; ``"pelvis_height"`` remains."""
-    return feature if feature == _HEIGHT else feature.rpartition("_")[0]
-
-
-def bones_of_limbs(limbs, skeleton):
-    """The bones of a skeleton that represent limbs, each once."""
-    bones = [bone for limb in limbs for bone in _bones_of_limb(limb, skeleton)]
-    return list(dict.fromkeys(bones))
-
-
 def _bones_of_limb(limb, skeleton):
+    """The bones of a skeleton that represent a limb."""
     ends = LIMBS[_PELVIS if limb == _HEIGHT else limb][:2]
     ends = tuple(skeleton.joints.index(name) for name in ends if name in skeleton.joints)
     # The hips, and the shoulders, are two bones each, from their middle.

@@ -43,7 +43,7 @@ from .bodies import (
 )
 from .limb_departures import draw_departures, split_at_synchronizer
 
-__all__ = ["SkeletonDisplay", "poses_at"]
+__all__ = ["SkeletonDisplay"]
 
 # The largest number of panels in a row.
 _PANELS_A_ROW = 4
@@ -161,8 +161,8 @@ class SkeletonDisplay(MovingDisplay):
         ]
         shown = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in shown]
-        display = cls(poses_at(shown, bodies), skeleton, titles)
-        return display.plot(ax)
+        scenes = [[x[[frame]] for x in bodies] for frame in shown]
+        return cls(scenes, skeleton, titles).plot(ax)
 
     @classmethod
     def from_trials(
@@ -495,11 +495,6 @@ class SkeletonDisplay(MovingDisplay):
                 x[whole(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
             ]
             panel.show(bodies, [x[whole(at * (len(x) - 1))] for x in behind])
-
-
-def poses_at(frames, trials):
-    """Scenes of single poses: for each frame a panel with those of all trials."""
-    return [[x[[frame]] for x in trials] for frame in frames]
 
 
 def _frames_of_model(frames, n_frames):

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import fill
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
-from ..body.direction_cosines import DirectionCosines
 from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.types import Features, TrialLike, ValuesLike
@@ -19,17 +18,8 @@ from ..inputs.wording import counted
 from ..live.members import Track
 from ..live.tracker import MotionTracker
 from ..matching.counting import runs_of
-from .arguments import (
-    as_frames,
-    as_names,
-    labels_of_signals,
-    time_label,
-    times_from_zero,
-)
+from .arguments import as_names, labels_of_signals, time_label, times_from_zero
 from .base import COLORS, WIDTH, AxesLike, Display, empty_lists, legend_above
-from .bodies import invert_poses
-from .limb_departures import bones_of_limbs, limb_of
-from .stick_figures import SkeletonDisplay, poses_at
 
 __all__ = ["TrackingDisplay"]
 
@@ -49,8 +39,7 @@ class TrackingDisplay(Display):
 
     One panel a feature: what was observed, the estimate with the band that contains 90 %, and the
     true course if it is known. Grey are times at which the feature was hidden, hatched those at
-    which the tracker was lost. Below are phase and rate. Use `from_estimator`; `strip` draws the
-    bodies.
+    which the tracker was lost. Below are phase and rate. Use `from_estimator`.
 
     Parameters
     ----------
@@ -68,8 +57,6 @@ class TrackingDisplay(Display):
         The labels of all features.
     shown : list of int
         The features that are drawn.
-    unit : {"frames", "seconds"}
-        The unit of the times.
     xlabel : str
         The label of the time axis.
 
@@ -108,7 +95,6 @@ class TrackingDisplay(Display):
     n_frames: int
     names: Sequence[str]
     shown: Sequence[int]
-    unit: Literal["frames", "seconds"]
     xlabel: str
 
     @property
@@ -206,7 +192,6 @@ class TrackingDisplay(Display):
             estimator.n_frames_,
             labels_of_signals(names, units_of_columns(X), units=units),
             shown,
-            "frames" if frame_rate is None else "seconds",
             xlabel or time_label(frame_rate),
         ).plot(ax)
 
@@ -257,45 +242,6 @@ class TrackingDisplay(Display):
         handles, labels = self.axes_[0].get_legend_handles_labels()
         of_label = dict(zip(labels, handles, strict=True))
         legend_above(self.axes_[:1], list(of_label.values()), list(of_label))
-
-    def strip(
-        self,
-        cosines: DirectionCosines,
-        *,
-        frames: int | Sequence[int] | np.ndarray = 6,
-        ax: AxesLike | None = None,
-    ) -> SkeletonDisplay:
-        """Draw estimated bodies at some frames, before the true ones; hidden limbs are violet.
-
-        Parameters
-        ----------
-        cosines : DirectionCosines
-            The fitted transformer of the features.
-        frames : int or list of int, default=6
-            The number of frames, evenly spaced from the first to the last, or their indices.
-        ax : Axes or array-like of Axes, default=None
-            As for `SkeletonDisplay.plot`.
-
-        Returns
-        -------
-        SkeletonDisplay
-            The display of the bodies, drawn.
-        """
-        if not isinstance(cosines, DirectionCosines):
-            raise ValueError(f"cosines must be DirectionCosines, got {type(cosines).__name__}.")
-        skeleton = cosines.skeleton.body()
-        estimate = invert_poses(self.track.poses, cosines, skeleton)
-        shown = as_frames(frames, len(estimate))
-        limbs = np.array([limb_of(name) for name in cosines.get_feature_names_out()])
-        marked = [bones_of_limbs(limbs[self.hidden[frame]], skeleton) for frame in shown]
-        titles = [f"frame {k}" for k in shown]
-        if self.unit == "seconds":
-            titles = [f"{time:.1f} s" for time in self.times[shown]]
-        behind = None
-        if self.truth is not None:
-            behind = poses_at(shown, [invert_poses(self.truth, cosines, skeleton)])
-        scenes = poses_at(shown, [estimate])
-        return SkeletonDisplay(scenes, skeleton, titles, marked=marked, behind=behind).plot(ax)
 
     def _draw_feature(self, axis, k):
         estimate = self.track.poses[:, k]

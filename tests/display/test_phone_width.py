@@ -72,10 +72,6 @@ def tracking(pipe, poses):
     return display.TrackingDisplay.from_estimator(tracker, seen, truth=poses[0], names=names)
 
 
-def tracked_bodies(pipe, poses):
-    return tracking(pipe, poses).strip(pipe[0])
-
-
 DRAWN = {
     "synchronization": lambda pipe, poses: display.SynchronizationDisplay.from_estimator(
         pipe, BUNCH.data, y=BUNCH.actor
@@ -119,7 +115,6 @@ DRAWN = {
     "cycles": cycles,
     "phases": phases,
     "tracking": tracking,
-    "tracked bodies": tracked_bodies,
 }
 
 

@@ -89,22 +89,6 @@ def test_a_single_frame_long_names_and_shared_axes(tracker):
     assert axes[2, 0].get_ylim()[1] > 3 * rates.max()
 
 
-def test_bodies_of_a_strip(display):
-    """Hidden limbs are violet, and the truth is a shadow."""
-    strip = display.strip(COSINES, frames=[2, 10])
-    skeleton = COSINES.skeleton.body()
-    joints = [skeleton.joints.index(f"left_{name}") for name in ("shoulder", "elbow", "wrist")]
-    arm = {tuple(joints[:2]), tuple(joints[1:])}
-    assert [set(bones) for bones in strip.marked] == [set(), arm]
-    np.testing.assert_allclose(
-        strip.behind[1][0].reshape(-1), COSINES.inverse_transform(X[4])[10], atol=1e-12
-    )
-    np.testing.assert_allclose(
-        strip.scenes[1][0].reshape(-1), COSINES.inverse_transform(display.track.poses)[10]
-    )
-    assert COSINES.hidden == "raise"
-
-
 def test_times_units_and_tables(tracker):
     times = np.arange(len(SEEN)) / 15
     table = pd.DataFrame(SEEN, columns=NAMES)
@@ -118,7 +102,7 @@ def test_times_units_and_tables(tracker):
     assert display.axes_[-1].get_xlabel() == "since the start (s)"
 
 
-def test_from_estimator_refuses(tracker, display):
+def test_from_estimator_refuses(tracker):
     for change, message in (
         ({"X": [SEEN, SEEN]}, "X must be one take, 2-D, got an array-like with 3 axes"),
         ({"features": "tail_x"}, "no feature 'tail_x'"),
@@ -129,5 +113,3 @@ def test_from_estimator_refuses(tracker, display):
             TrackingDisplay.from_estimator(tracker, **({"X": SEEN} | change))
     with pytest.raises(ValueError, match="time stamps must increase"):
         TrackingDisplay.from_estimator(tracker, SEEN, times=np.arange(len(SEEN))[::-1])
-    with pytest.raises(ValueError, match="cosines must be DirectionCosines, got int"):
-        display.strip(1)
