@@ -22,8 +22,8 @@ __all__ = [
     "as_indices",
     "as_names",
     "as_trials",
-    "labels_as_text",
     "labels_of_signals",
+    "names_of_trials",
     "time_label",
     "times_from_zero",
     "undo_scaling",
@@ -100,9 +100,11 @@ def as_trials(X, skeleton=None) -> list:
     return [X] if collection is None else collection
 
 
-def labels_as_text(trials):
-    """Labels of trials, the levels of a label joined by commas."""
-    return list(map(text_of_label, labels_of(trials)[0]))
+def names_of_trials(names, trials):
+    """Names of trials as text; None: their labels, the levels of a label joined by commas."""
+    if names is None:
+        names = map(text_of_label, labels_of(trials)[0])
+    return as_names(names, len(trials), "names", "trials")
 
 
 def labels_of_signals(names, known_units, ylabel=None, units=None):

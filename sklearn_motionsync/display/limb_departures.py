@@ -110,7 +110,7 @@ def _bones_of_limb(limb, skeleton):
     return [ends] if ends in skeleton.bones else [b for b in skeleton.bones if b[1] in ends]
 
 
-def draw_departures(estimator, X, params, caller, *, trial, frames, limit, reference):
+def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
     """What `SkeletonDisplay` draws of the departures of a trial: values of its parameters.
 
     Parameters
@@ -118,7 +118,7 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, limit, refer
     estimator : Pipeline
     X, params, caller
         As for `view_of`.
-    trial, frames, limit, reference
+    trial, frames, reference
         As for `SkeletonDisplay.from_departures`.
 
     Returns
@@ -133,10 +133,6 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, limit, refer
         (model,) = models
         estimator, X, params = model.estimator, model.trials, {}
     before, _ = split_at_synchronizer(estimator)
-    if limit is not None and not limit > 0:
-        raise ValueError(
-            f"limit must be a number of standard deviations above 0, or None; got {limit!r}."
-        )
     chosen = index if models is None else None
     judged = judge(estimator, X, params, caller, reference=reference, only=chosen)
     view, limbs = judged.view, judged.space.limbs
@@ -154,11 +150,10 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, limit, refer
         i, note = 0, " by the model of that class"
         name = name_trial(int(model.indices[0]), model.labels[0])
         name = f"{name}, most like {str(model.label)!r},"
-    rows, skeleton = judged.rows(i, limit), limbs.cosines.skeleton.body()
+    rows, skeleton = judged.rows(i, None), limbs.cosines.skeleton.body()
     is_accepted = view.model_of_points.predict(view.curves.points.take([i]))[0] == 1
-    if limit is None:
-        # Hints would hide what is rare, and most right trials have some.
-        rows = [row for row in rows if row.rare] or ([] if is_accepted else rows)
+    # Hints would hide what is rare, and most right trials have some.
+    rows = [row for row in rows if row.rare] or ([] if is_accepted else rows)
     shown, titles, marked = limb_departures(rows, len(judged.mean), frames, skeleton)
     bodies, shadows = (
         np.asarray(limbs.cosines.inverse_transform(limbs.invert(x)))

@@ -24,10 +24,9 @@ from ..utils.pipelines import find_step
 from .animation import MovingDisplay
 from .arguments import (
     as_index,
-    as_names,
     as_trials,
-    labels_as_text,
     labels_of_signals,
+    names_of_trials,
     time_label,
     times_from_zero,
 )
@@ -178,8 +177,7 @@ class PhaseDisplay(MovingDisplay):
         live = estimator
         is_single, trials = as_collection(X) is None, list(as_trials(X))
         trials = trials[:_N_TRIALS]
-        names = labels_as_text(trials) if names is None else names
-        names = as_names(names, len(trials), "names", "trials")
+        names = names_of_trials(names, trials)
         stamps = None
         if times is not None:
             listed: Any = [times] if is_single else times

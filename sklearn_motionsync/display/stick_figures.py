@@ -25,13 +25,7 @@ from ..utils.pipelines import (
     route_to_synchronizer,
 )
 from .animation import MovingDisplay
-from .arguments import (
-    as_frames,
-    as_indices,
-    as_names,
-    as_trials,
-    labels_as_text,
-)
+from .arguments import as_frames, as_indices, as_trials, names_of_trials
 from .base import WIDTH, AxesLike
 from .bodies import (
     BodyPanel,
@@ -200,8 +194,7 @@ class SkeletonDisplay(MovingDisplay):
         """
         X = as_trials(X, skeleton)
         bodies = [place_on_floor(read_positions(x, skeleton, i), skeleton) for i, x in enumerate(X)]
-        names = labels_as_text(X) if names is None else names
-        labels = as_names(names, len(X), "names", "trials")
+        labels = names_of_trials(names, X)
         scenes, titles, durations = [bodies], ["each at its own pace"], None
         if match is not None:
             warped = match.warp([x.reshape(len(x), -1) for x in bodies])
@@ -334,7 +327,6 @@ class SkeletonDisplay(MovingDisplay):
         *,
         trial: int = 0,
         frames: int | Sequence[int] | np.ndarray = 6,
-        limit: float | None = None,
         reference: TrialsLike | None = None,
         ax: AxesLike | None = None,
         **params: Any,
@@ -343,8 +335,8 @@ class SkeletonDisplay(MovingDisplay):
 
         The figure shows poses of the trial on the clock of the model, before pale shadows
         of what is expected. Limbs that depart are violet: those of the rows of `find_departures`
-        that are rare; without one, and without ``limit``, those of all rows if the model refuses
-        the trial, and otherwise none; for the height of the pelvis the hips are marked.
+        that are rare; without one, those of all rows if the model refuses the trial, and otherwise
+        none; for the height of the pelvis the hips are marked.
         Titles tell the most important departure: the limb, and by how much it is off, late, or
         moves too little or too far. The heading says whether the model accepts the trial, and
         what is rare; it may accept it although limbs depart, because it evaluates only what the
@@ -365,8 +357,6 @@ class SkeletonDisplay(MovingDisplay):
             important departure, or in its middle without one. A list gives frames of the model,
             each of which represents the frames that are nearest to it, up to a twelfth of the clock
             away. A limb is marked if it departs anywhere in its part.
-        limit : float, default=None
-            As for `find_departures`.
         reference : trials, default=None
             One to five right trials of the same person, as for `find_departures`.
         ax : Axes or array-like of Axes, default=None
@@ -382,8 +372,8 @@ class SkeletonDisplay(MovingDisplay):
         Raises
         ------
         ValueError
-            If there is no such trial or frame, ``limit`` is not above 0, or the features of
-            the model cannot be inverted to those of `DirectionCosines`.
+            If there is no such trial or frame, or the features of the model cannot be inverted to
+            those of `DirectionCosines`.
 
         See Also
         --------
@@ -397,7 +387,6 @@ class SkeletonDisplay(MovingDisplay):
             f"{cls.__name__}.from_departures",
             trial=trial,
             frames=frames,
-            limit=limit,
             reference=reference,
         )
         display = cls(scenes, skeleton, titles, marked=marked, behind=behind, heading=heading)

@@ -12,7 +12,7 @@ from sklearn.pipeline import make_pipeline
 
 from ..body.base import PositionsTransformer
 from ..body.skeleton import Skeleton
-from ..display.arguments import as_names, as_trials, labels_as_text
+from ..display.arguments import as_trials, names_of_trials
 from ..display.base import COLORS
 from ..display.bodies import (
     bones_by_side,
@@ -31,7 +31,7 @@ from ..utils.files import check_path
 from ..utils.pipelines import transform_through, union_transformers
 from .page import Page, paragraph, read_part
 
-__all__ = ["add_player_of", "player_of", "write_player"]
+__all__ = ["add_player_of", "write_player"]
 
 # Coordinates that a report holds, at most, of two bytes each: 4 MB of text. And frames a trial that
 # a movement needs at least; where these are too many, there are fewer trials.
@@ -126,8 +126,7 @@ def write_player(
             f"X has {n} trials, and a player shows {MOST_SHOWN} side by side at most: choose "
             f"some of them, such as X[:{MOST_SHOWN}]."
         )
-    names = labels_as_text(trials) if names is None else names
-    names = as_names(names, n, "names", "trials")
+    names = names_of_trials(names, trials)
     bodies = [_points(x, skeleton, i) for i, x in enumerate(trials)]
     for i, (points, _, _) in enumerate(bodies):
         if len(points) < 2:
@@ -200,23 +199,22 @@ def _bodies_of(reached, X, params):
 
 
 def add_player_of(page, trials, X, params, skeleton):
-    """Add the player of a report, where there are bodies."""
-    if skeleton is None:
-        X, skeleton = _bodies_of(trials.aligned.reached, X, params)
-    if skeleton is not None:
-        add_player(page, *player_of(trials, X, skeleton))
-
-
-def player_of(trials, X, skeleton):
-    """The data of the player of a report, and sentences on what it shows.
+    """Add the player of a report, where there are bodies.
 
     Parameters
     ----------
+    page : Page
     trials : TrialSet
-    X : trials
-        Joint positions.
-    skeleton : Skeleton
+    X : trials, as the first step takes them
+    params : dict
+        As for `transform_through`.
+    skeleton : Skeleton or None
+        Of the joint positions X; None: that of a step of the pipeline.
     """
+    if skeleton is None:
+        X, skeleton = _bodies_of(trials.aligned.reached, X, params)
+    if skeleton is None:
+        return
     n, pattern = len(trials.names), trials.pattern
     X = as_trials(X, skeleton)
     first = 0 if pattern is None else pattern
@@ -234,7 +232,7 @@ def player_of(trials, X, skeleton):
     data["shown"] = sorted({1 if right == 0 and len(chosen) > 1 else 0, right})
     if len(chosen) < n:
         note = f"{note} The player holds {counted(len(chosen), 'trial')} of {n}."
-    return data, note
+    add_player(page, data, note)
 
 
 def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):

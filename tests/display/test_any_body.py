@@ -77,7 +77,7 @@ def test_model_and_departures_of_any_part(joints, axes):
     assert np.isfinite(mean).all()
     still = np.repeat(X[0].to_numpy()[:1], 40, axis=0)
     still = pd.DataFrame(still, columns=X[0].columns)
-    display = SkeletonDisplay.from_departures(pipe, [X[1], still], trial=1, frames=3, limit=0.5)
+    display = SkeletonDisplay.from_departures(pipe, [X[1], still], trial=1, frames=3)
     assert display.skeleton == skeleton
     marked = {skeleton.joints[joint] for of_panel in display.marked for _, joint in of_panel}
     assert marked & {"left_knee", "left_ankle", "left_hip", "neck", "left_elbow"}
