@@ -5,7 +5,7 @@ from copy import copy
 import numpy as np
 
 from ..body.axes import heading_axes, to_y_up
-from ..body.columns import check_columns, plain_positions
+from ..body.columns import check_columns
 from ..body.direction_cosines import DirectionCosines
 from ..body.formats import AXES
 from ..body.limbs import unit_vectors
@@ -56,7 +56,6 @@ def read_positions(x, skeleton, i):
         wanted = skeleton.column_names
         if set(column_names(x) or ()) == set(wanted) and len(x.columns) == len(wanted):
             x = x[wanted]
-        x = plain_positions(x, skeleton)
         check_columns(column_names(x) or (), skeleton, what)
         n_dims, n_joints = skeleton.n_dims, len(skeleton.joints)
         expected = f"the skeleton's {n_joints} joints are (n_frames, {n_dims * n_joints})"
@@ -95,10 +94,11 @@ def place_on_floor(x, skeleton, *, follow=False):
     """
     n_dims = x.shape[2]
     rotation = np.eye(n_dims)
-    pair = None if skeleton is None or n_dims == 2 else _heading_pair(skeleton)
-    if pair is not None:
-        left, right = (landmark_track(x, skeleton, f"{side}_{pair}") for side in ("left", "right"))
-        rotation = heading_axes(unit_vectors(_fill_gaps(left - right, f"{pair}s")[:1]))[0]
+    named = set() if skeleton is None or n_dims == 2 else set(skeleton.landmarks)
+    pairs = [part for part in ("hip", "shoulder") if {f"left_{part}", f"right_{part}"} <= named]
+    if pairs:
+        left, right = (landmark_track(x, skeleton, f"{s}_{pairs[0]}") for s in ("left", "right"))
+        rotation = heading_axes(unit_vectors(_fill_gaps(left - right, f"{pairs[0]}s")[:1]))[0]
     if skeleton is not None and "pelvis" in skeleton.landmarks:
         track = _fill_gaps(landmark_track(x, skeleton, "pelvis"), "pelvis")
     else:
@@ -117,16 +117,6 @@ def landmark_track(x, skeleton, landmark):
     return x[:, list(skeleton.indices_of(landmark))].mean(axis=1)
 
 
-def _heading_pair(skeleton):
-    """The paired landmarks that determine the heading; None if the skeleton has no such pair."""
-    pairs = [
-        part
-        for part in ("hip", "shoulder")
-        if {f"left_{part}", f"right_{part}"} <= set(skeleton.landmarks)
-    ]
-    return pairs[0] if pairs else None
-
-
 def _fill_gaps(track, what):
     """A track (n_frames, n_dims) with straight lines across its gaps."""
     if np.isnan(track).any(axis=1).all():
@@ -142,20 +132,14 @@ def project(x, skeleton, azimuth):
     Positions in a plane are used as they are. The points are the joints and, if limbs are drawn
     between landmarks, these after the joints.
     """
-    x = _with_landmarks(x, skeleton)
+    if skeleton is not None and _joins_landmarks(skeleton):
+        landmarks = [landmark_track(x, skeleton, name) for name in skeleton.body().joints]
+        x = np.concatenate([x, np.stack(landmarks, axis=1)], axis=1)
     if x.shape[-1] == 2:
         return x
     a = np.deg2rad(azimuth)
     across = x @ np.array([np.cos(a), 0, -np.sin(a)])
     return np.stack([across, x[..., 1]], axis=-1)
-
-
-def _with_landmarks(x, skeleton):
-    """The joints and, if limbs are drawn between landmarks, these after the joints."""
-    if skeleton is None or not _joins_landmarks(skeleton):
-        return x
-    landmarks = [landmark_track(x, skeleton, name) for name in skeleton.body().joints]
-    return np.concatenate([x, np.stack(landmarks, axis=1)], axis=1)
 
 
 def _joins_landmarks(skeleton):

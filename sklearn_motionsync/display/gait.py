@@ -140,6 +140,8 @@ class GaitDisplay(Display):
         return [(k, 0) for k in range(count)], (count, 1), (WIDTH, 1.2 + 1.5 * count)
 
     def _draw(self):
+        from matplotlib.lines import Line2D
+
         sides = self._sides()
         *feet, bars = self.axes_
         self.stances_ = {side: self._stances(side) for side in sides}
@@ -153,7 +155,13 @@ class GaitDisplay(Display):
         height = f"height ({self.unit})" if self.unit else "height"
         names = [*[height] * len(sides), "foot"]
         self._label_axes(self.axes_, names, self.xlabel or "time (s)", ends=self.times)
-        self._draw_legend()
+        shown = [("heel", "-")] + [("toe", "--")] * any(n.endswith("toe") for n in self.heights)
+        handles = [Line2D([], [], color="gray", linestyle=s, label=name) for name, s in shown]
+        handles += [
+            Line2D([], [], color="black", linestyle=style, linewidth=0.9, label=name)
+            for name, style in (("strike", "-"), ("foot-off", ":"))
+        ]
+        legend_above(self.axes_[:1], handles)
 
     def _sides(self):
         return [side for side in SIDES if f"{side}_heel" in self.heights]
@@ -186,14 +194,3 @@ class GaitDisplay(Display):
             for time in self._times_of(side, label):
                 axis.axvline(time, color="black", linestyle=style, linewidth=0.9)
         axis.set_title(f"{side} foot", fontsize="medium")
-
-    def _draw_legend(self):
-        from matplotlib.lines import Line2D
-
-        shown = [("heel", "-")] + [("toe", "--")] * any(n.endswith("toe") for n in self.heights)
-        handles = [Line2D([], [], color="gray", linestyle=s, label=name) for name, s in shown]
-        handles += [
-            Line2D([], [], color="black", linestyle=style, linewidth=0.9, label=name)
-            for name, style in (("strike", "-"), ("foot-off", ":"))
-        ]
-        legend_above(self.axes_[:1], handles)

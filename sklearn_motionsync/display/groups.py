@@ -303,14 +303,10 @@ class GroupDisplay(Display):
             offsets,
             strict=True,
         ):
-            panels = np.concatenate(
-                [curves_of_people, offsets_of_people[:, :, np.newaxis]], axis=2
-            )
+            panels = np.concatenate([curves_of_people, offsets_of_people[:, :, np.newaxis]], axis=2)
             mean, half = band_of_mean(panels, statistic, coverage)
             drawn = shown[maker.any(axis=0)] if trials else None
-            of_groups.append(
-                GroupCurves(mean, mean - half, mean + half, drawn, label, color, line)
-            )
+            of_groups.append(GroupCurves(mean, mean - half, mean + half, drawn, label, color, line))
         return cls(
             of_groups,
             offsets,

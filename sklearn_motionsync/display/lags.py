@@ -168,7 +168,12 @@ class LagDisplay(Display):
             )
             for i, where in enumerate(unsure)
         ]
-        top.set_yticks(range(len(mean)), self._names(), fontsize="small")
+        names = list(self.lags.parts)
+        if self.lags.groups is not None:
+            # With their repeatability where it is known.
+            icc = self.lags.summary()["icc"]
+            names = [f"{name}\nICC {x:.2f}" if x == x else name for name, x in icc.items()]
+        top.set_yticks(range(len(mean)), names, fontsize="small")
         top.set_ylim(len(mean) - 0.5, -0.5)
         top.set_xlim(axis.clock[0], axis.clock[-1])
         top.set_xlabel(axis.label)
@@ -206,13 +211,6 @@ class LagDisplay(Display):
         units = "trials" if self.lags.groups is None else "people"
         handles = [self.means_[0], self.intervals_[0], self.spreads_[0]]
         legend_above(panels, handles, ["mean", f"95 % interval ({units})", "± 1 SD of trials"])
-
-    def _names(self):
-        """Names of the parts, with their repeatability (ICC) where it is known."""
-        if self.lags.groups is None:
-            return list(self.lags.parts)
-        icc = self.lags.summary()["icc"]
-        return [f"{name}\nICC {x:.2f}" if x == x else name for name, x in icc.items()]
 
     def _describe(self):
         n_sequences, n_parts = self.lags.values.shape[:2]

@@ -188,6 +188,10 @@ class PhaseDisplay(MovingDisplay):
         if features is None:
             features = [first_largest(live.mean_.var(axis=0))]
         shown = choose_features(features, feature_names)
+        spread = None
+        if training is not None:
+            warped = np.asarray(live.synchronizer_.match(training).warp(training))
+            spread = warped.reshape(-1, *live.mean_.shape).std(axis=0)[:, shown]
         bodies, mean_body, skeleton = [None] * len(seen), None, None
         if body is not None:
             skeleton = find_step(body, DirectionCosines)[1].skeleton.body()
@@ -197,7 +201,7 @@ class PhaseDisplay(MovingDisplay):
             live.cyclic,
             live.duration_ / (live.frame_rate or 1.0),
             live.mean_[:, shown],
-            None if training is None else _spread(live, training)[:, shown],
+            spread,
             mean_body,
         )
         running = []
@@ -265,9 +269,7 @@ class PhaseDisplay(MovingDisplay):
     def _draw(self):
         last = self.action.n_frames - 1
         # The latest time observed or predicted.
-        end = max(
-            (p.times + np.where(p.phases.phase < last, p.left, 0)).max() for p in self.trials
-        )
+        end = max((p.times + np.where(p.phases.phase < last, p.left, 0)).max() for p in self.trials)
         by_row = np.array(self.axes_, dtype=object).reshape(len(self.trials), -1)
         curves_from = self._has_bodies() + 1
         self.rows_ = []
@@ -295,12 +297,6 @@ def _final_phases(live, x):
     clock = np.arange(live.n_frames_)
     # Where tau is constant, all phases in between are equally right.
     return np.interp(np.linspace(0, clock[-1], len(x)), tau + 1e-9 * clock, clock)
-
-
-def _spread(live, training):
-    """The standard deviation (P, n_features) of the training trials from their mean."""
-    match = live.synchronizer_.match(training)
-    return np.asarray(match.warp(training)).reshape(-1, *live.mean_.shape).std(axis=0)
 
 
 # -- what is drawn -----------------------------------------------------------------------

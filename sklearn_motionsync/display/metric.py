@@ -108,7 +108,15 @@ class MetricDisplay(Display):
         check_is_fitted(synchronizer)
         metric = synchronizer.metric_
         if metric is None:
-            raise ValueError(_explain_missing(synchronizer))
+            n = len(synchronizer.global_distances_)
+            names = "metric", "cost", "consensus"
+            values = ", ".join(f"{name}={getattr(synchronizer, name)!r}" for name in names)
+            raise ValueError(
+                "There is no metric to draw, metric_ is None: DenseSynchronizer learns one with "
+                "metric='learned', cost='velocity' and consensus above 0, from at least 3 trials "
+                f"in which something moves. It has {values} and was fitted to "
+                f"{counted(n, 'trial')}; change what is missing and fit it again."
+            )
         names = names_of_features(before, synchronizer, len(metric.share))
         shares = np.column_stack([metric.share, metric.energy])
         if features is None:
@@ -162,16 +170,3 @@ def _sort_and_sum(names, shares):
     n_summed = len(names) - (_MAX_ROWS - 1)
     names = [*names[:-n_summed], f"{n_summed} others"]
     return names, np.vstack([shares[:-n_summed], shares[-n_summed:].sum(axis=0)])
-
-
-def _explain_missing(synchronizer):
-    """An error message: the conditions for a metric, and those of the synchronizer."""
-    n = len(synchronizer.global_distances_)
-    values = {name: getattr(synchronizer, name) for name in ("metric", "cost", "consensus")}
-    return (
-        "There is no metric to draw, metric_ is None: DenseSynchronizer learns one with "
-        "metric='learned', cost='velocity' and consensus above 0, from at least 3 trials "
-        f"in which something moves. It has {', '.join(f'{k}={v!r}' for k, v in values.items())} "
-        f"and was fitted to {counted(n, 'trial')}; change what is missing and fit it "
-        "again."
-    )

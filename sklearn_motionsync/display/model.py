@@ -223,7 +223,20 @@ class ActionModelDisplay(Display):
         n_cols = self._layout()[1][1]
         self._label_axes(self.axes_, self.ylabels, self.axis.label, n_cols=n_cols)
         self.keyframes_ = self.axis.draw_keyframes(self.axes_, self.axes_[0])
-        self._draw_legend(n_cols)
+        # The meaning of the band is the title of the legend.
+        title, what = self.titles
+        handles, labels = [self.envelope_[0]], [what]
+        if self.trials is not None:
+            handles.append(self.trials_[0])
+            labels.append(counted(len(self.trials), "trial"))
+        if self.departures:
+            lower, upper = self._outer_bounds()
+            outside = (self.trials < lower) | (self.trials > upper)
+            handles.append(self.departures_[0])
+            labels.append(f"outside the band: {outside.any(axis=(1, 2)).sum()} of them")
+        handles, labels = [*handles, self.mean_[0]], [*labels, "mean"]
+        below = self.axes_[:n_cols]
+        legend_above(self.axes_, handles, labels, title, below=below, n_cols=1)
 
     def _draw_feature(self, axis, i):
         """Draw the band of a feature, then trials, departures, and the mean."""
@@ -265,22 +278,6 @@ class ActionModelDisplay(Display):
         largest = np.abs([self.lower, self.upper]).max(axis=(0, 1))
         margin = _ROUNDING * np.finfo(np.result_type(self.mean, np.float32)).eps * largest
         return self.lower - margin, self.upper + margin
-
-    def _draw_legend(self, n_cols):
-        """Draw a legend above the panels, with the meaning of the band as its title."""
-        title, what = self.titles
-        handles, labels = [self.envelope_[0]], [what]
-        if self.trials is not None:
-            handles.append(self.trials_[0])
-            labels.append(counted(len(self.trials), "trial"))
-        if self.departures:
-            lower, upper = self._outer_bounds()
-            outside = (self.trials < lower) | (self.trials > upper)
-            handles.append(self.departures_[0])
-            labels.append(f"outside the band: {outside.any(axis=(1, 2)).sum()} of them")
-        below = self.axes_[:n_cols]
-        handles, labels = [*handles, self.mean_[0]], [*labels, "mean"]
-        legend_above(self.axes_, handles, labels, title, below=below, n_cols=1)
 
 
 def _keyframes_of(estimator, n_frames, keyframes):

@@ -131,7 +131,8 @@ class SearchDisplay(Display):
 
     def _draw(self):
         from matplotlib.collections import PatchCollection
-        from matplotlib.patches import Rectangle
+        from matplotlib.lines import Line2D
+        from matplotlib.patches import Patch, Rectangle
 
         shown = self._shown()
         accepted, self.hits_ = self._accepted(), []
@@ -147,7 +148,11 @@ class SearchDisplay(Display):
                 colors.append(COLORS["trial"] if is_hit else COLORS["shadow"])
             self.hits_.append(PatchCollection(boxes, facecolors=colors, edgecolors="white"))
             axis.add_collection(self.hits_[-1])
-            self._draw_segments(axis, take)
+            if self.segments is not None:
+                true = self.segments[(self.segments["take"] == take).to_numpy()]
+                spans = np.column_stack([true["start"], true["stop"] - true["start"]]).tolist()
+                strip = _BOTTOM - _STRIP, 0.8 * _STRIP
+                axis.broken_barh(spans, strip, facecolors=COLORS["pattern"], edgecolors="white")
             for level in rows["threshold"].unique():
                 axis.axhline(level, color=COLORS["mean"], linestyle="--", linewidth=1)
             axis.set_xlim(0, self.lengths[take])
@@ -156,24 +161,6 @@ class SearchDisplay(Display):
             axis.set_title(title, fontsize="medium")
         time = self.xlabel or "frame of the take"
         self._label_axes(self.axes_, ["score (1: alike)"] * len(shown), time)
-        self._draw_legend()
-
-    def _accepted(self):
-        return (self.origin["score"] >= self.origin["threshold"]).to_numpy(dtype=bool)
-
-    def _draw_segments(self, axis, take):
-        """Draw the true segments as a strip below the hits."""
-        if self.segments is None:
-            return
-        rows = self.segments[(self.segments["take"] == take).to_numpy()]
-        spans = np.column_stack([rows["start"], rows["stop"] - rows["start"]]).tolist()
-        strip = _BOTTOM - _STRIP, 0.8 * _STRIP
-        axis.broken_barh(spans, strip, facecolors=COLORS["pattern"], edgecolors="white")
-
-    def _draw_legend(self):
-        from matplotlib.lines import Line2D
-        from matplotlib.patches import Patch
-
         handles = [
             Patch(facecolor=COLORS["trial"], label="hit"),
             Patch(facecolor=COLORS["shadow"], label="below the threshold"),
@@ -182,3 +169,6 @@ class SearchDisplay(Display):
         if self.segments is not None:
             handles.append(Patch(facecolor=COLORS["pattern"], label="known to be there"))
         legend_above(self.axes_[:1], handles)
+
+    def _accepted(self):
+        return (self.origin["score"] >= self.origin["threshold"]).to_numpy(dtype=bool)

@@ -337,7 +337,14 @@ class SynchronizationDisplay(Display):
             self.before_.append(self._draw_trials(left, times, before, colors))
             self.after_.append(self._draw_trials(right, [clock] * len(after), after, colors))
             self.group_means_.append(self._draw_means(right, clock, row, styles))
-            self.pattern_.append(self._draw_pattern(right, clock, row))
+            self.pattern_ += right.plot(
+                clock,
+                self.pattern[:, row],
+                color=COLORS["pattern"],
+                linestyle="--" if styles else "-",
+                linewidth=1.2 if styles else 1.6,
+                zorder=5,
+            )
             right.sharey(left)
             right.autoscale_view()
         self._label_axes(lefts, self.ylabels, self.axis.trial_label)
@@ -378,17 +385,6 @@ class SynchronizationDisplay(Display):
             curve = nanmean(self.after[members, :, row], axis=0)
             means.append(front_line(axis, clock, curve, color=color, linestyle=line))
         return means
-
-    def _draw_pattern(self, axis, clock, row):
-        (line,) = axis.plot(
-            clock,
-            self.pattern[:, row],
-            color=COLORS["pattern"],
-            linestyle="--" if self.groups else "-",
-            linewidth=1.2 if self.groups else 1.6,
-            zorder=5,
-        )
-        return line
 
     def _draw_offsets(self, axis, clock, colors):
         """Draw offsets from their mean, and bands around them if the match tells intervals."""
