@@ -51,9 +51,9 @@ aligned = match.warp(trials)
 before = [100 * x["knee_flexion"].argmax() / (len(x) - 1) for x in trials]
 after = aligned[:, :, 1].argmax(axis=1)
 
-display = SynchronizationDisplay.from_predictions(
-    trials,
+display = SynchronizationDisplay.from_estimator(
     match,
+    trials,
     features=["knee_flexion", "vertical_force"],
     y=gait.group,
     unit="percent",

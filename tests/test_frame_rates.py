@@ -69,9 +69,6 @@ def with_files(tmp_path):
         "SynchronizationDisplay.from_estimator": lambda **k: (
             display.SynchronizationDisplay.from_estimator(DENSE, X, **k)
         ),
-        "SynchronizationDisplay.from_predictions": lambda **k: (
-            display.SynchronizationDisplay.from_predictions(X, MATCH, **k)
-        ),
         "gait_events": lambda **k: gait.gait_events(WALK.data, WALK.skeleton, **k),
         "gait_parameters": lambda **k: gait.gait_parameters(WALK.data, WALK.skeleton, **k),
         "keyframes_from_events": lambda **k: io.keyframes_from_events(X, EVENTS, **k),

@@ -9,14 +9,11 @@ from typing import Any, Self
 import numpy as np
 from sklearn.base import BaseEstimator
 
-from ..inputs.collections import as_collection
-from ..inputs.facts import units_of_columns
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.numbers import check_finite, nanmean
-from ..inputs.types import Features, Labels, NumbersLike, TrialsLike, Unit, ValuesLike
-from ..inputs.validation import read_collection
+from ..inputs.numbers import nanmean
+from ..inputs.types import Features, Labels, TrialsLike, Unit
 from ..inputs.wording import counted
-from ..synchronizers.match import Match, check_coverage, match_of_times
+from ..synchronizers.match import Match, check_coverage
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .arguments import labels_of_signals, undo_scaling
@@ -49,7 +46,7 @@ class SynchronizationDisplay(Display):
 
     Below the features are the offsets: how much later or earlier than the others a trial is.
     They are counted from the mean offset of all trials, so this mean is a line at 0. Use
-    `from_estimator` or `from_predictions`.
+    `from_estimator`.
 
     Parameters
     ----------
@@ -205,88 +202,6 @@ class SynchronizationDisplay(Display):
             labels_of_signals([names[i] for i in chosen], known_units, ylabel, units),
             undo(synchronizer.pattern_)[:, chosen],
             ("as recorded", "the pattern" if index is None else f"the pattern, trial {index}"),
-            None if y is None else names_of_groups(y, len(shown), name="y"),
-            coverage,
-        ).plot(ax, warps=warps)
-
-    @classmethod
-    def from_predictions(
-        cls,
-        X: TrialsLike,
-        match: Match | NumbersLike,
-        *,
-        features: Features | None = None,
-        y: Labels | None = None,
-        unit: Unit = "frames",
-        frame_rate: float | ValuesLike | None = None,
-        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
-        units: str | Sequence[str] | Mapping[str, str] | None = None,
-        xlabel: str | None = None,
-        warps: bool = True,
-        coverage: float | None = 0.9,
-        ax: AxesLike | None = None,
-    ) -> Self:
-        """Draw trials and warps that are known already.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or (trial, frame) frame
-            Trials, with NaN in gaps. Their mean on the clock takes the place of the pattern.
-        match : Match, or array-like of shape (n_sequences, P)
-            Such as ``synchronizer.match(X)``; or the warps tau(p) from 0 to P - 1 alone.
-        features : int, str or list of them, default=None
-            Features by index or name; by default the first four.
-        y : sequence of length n_sequences, default=None
-            What the trials are told apart by, which determines their colour.
-        unit : {"frames", "percent", "seconds"}, default="frames"
-            The unit of time.
-        frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X, for seconds; by default what tables tell, or the match, as in
-            `Match.offsets_in`.
-        ylabel, units : str, list of str or dict, default=None
-            Labels of the features and their units: of all, one each, or by name. By default their
-            names, and what tables tell in ``attrs["units"]``.
-        xlabel : str, default=None
-            The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
-        warps : bool, default=True
-            Whether to draw the offsets, in a panel of their own.
-        coverage : float or None, default=0.9
-            Probability of the intervals around the offsets, as of `from_estimator`.
-        ax : Axes or array-like of Axes, default=None
-            See `plot`.
-
-        Returns
-        -------
-        SynchronizationDisplay
-            The display, drawn.
-
-        Raises
-        ------
-        ValueError
-            If the match is of another number of trials, there is no such feature, labels or
-            units do not fit, or a value is infinite.
-        """
-        if coverage is not None:
-            check_coverage(coverage)
-        arrays, names = read_collection(X)
-        if not isinstance(match, Match):
-            match = match_of_times(match, len(arrays))
-        for i, x in enumerate(arrays):
-            check_finite(x, f"Trial {i}, frame", allow_nan=True)
-        names = names or [f"x{i}" for i in range(arrays[0].shape[1])]
-        chosen = choose_features(features, names)
-        shown = [x[:, chosen] for x in arrays]
-        after, known_units = match.warp(shown), units_of_columns(as_collection(X)[0])
-        facts, lengths = match.facts_of(X, frame_rate), [len(x) for x in shown]
-        lasting = facts.durations() if unit == "seconds" else None
-        return cls(
-            shown,
-            after,
-            match.of_trials(facts, match.reached),
-            TimeAxis(unit, after.shape[1], lengths, lasting, xlabel),
-            labels_of_signals([names[i] for i in chosen], known_units, ylabel, units),
-            nanmean(after, axis=0),
-            ("as recorded", "their mean"),
             None if y is None else names_of_groups(y, len(shown), name="y"),
             coverage,
         ).plot(ax, warps=warps)

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from artists import segments
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
@@ -32,7 +33,6 @@ BUNCH = make_bending(4, n_frames=20, random_state=2)
 POSITIONS = BUNCH.data
 X = [x[:, :3] for x in POSITIONS]
 TIMES = np.tile(np.linspace(0, 9, 10), (4, 1))
-BACKWARDS = np.vstack([TIMES[:3], TIMES[:1, ::-1]])
 # The kind of estimator that each display draws. A search needs no fit, nor does a segmenter.
 ESTIMATORS = {
     "ActionModelDisplay": ActionModel(),
@@ -70,43 +70,27 @@ def refuses(call, message):
         call()
 
 
-def draw_synchronization(**arguments):
-    return SynchronizationDisplay.from_predictions(**({"X": X, "match": TIMES} | arguments))
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"X": []}, "Found 0 trials"),
-        ({"X": X[0]}, r"single 2-D input\. Wrap one trial as \[X\]"),
-        ({"X": [*X[:3], masked(X[3])]}, "Trial 3 has masked values"),
-        ({"X": [*X[:3], with_one(X[3], np.inf)]}, "Trial 3, frame 3, feature 1 is infinity"),
-        ({"match": TIMES[:2]}, r"each of the 4 trials; got \(2, 10\)"),
-        ({"match": TIMES + 1}, "times must be from 0 to P - 1 = 9"),
-        ({"match": BACKWARDS}, "times"),
-        ({"match": Match(TIMES[:2])}, "2 matched trials, but 4"),
-        *(({"features": bad}, "There is no feature .*there are 3: x0, x1, x2")
-          for bad in (3, -1, 1.5, True, "knee", [0, "x3"])),
-        ({"features": []}, "at least one feature"),
-        *(({"coverage": bad}, "coverage must be a probability above 0 and below 1, .*; got")
-          for bad in (0, 1, 90, "0.9", True, np.nan)),
+        *(
+            ({"coverage": bad}, "coverage must be a probability above 0 and below 1, .*; got")
+            for bad in (0, 1, 90, "0.9", True, np.nan)
+        ),
         ({"ax": []}, r"ax must be Axes of matplotlib, got \[\]"),
         ({"ax": "left"}, "ax must be Axes of matplotlib, got 'left'"),
     ],
-)  # fmt: skip
-def test_synchronization_from_predictions_refuses(arguments, message):
-    refuses(lambda: draw_synchronization(**arguments), message)
+)
+def test_synchronization_refuses(pipe, arguments, message):
+    refuses(lambda: SynchronizationDisplay.from_estimator(pipe, POSITIONS, **arguments), message)
 
 
 def test_nan_is_drawn_as_a_gap():
     gaps = [with_one(X[0], np.nan, slice(0, 4)), *X[1:]]
-    display = draw_synchronization(X=gaps)
+    display = SynchronizationDisplay.from_estimator(LinearSynchronizer(10).fit(X), gaps)
+    assert np.isnan(segments(display.before_[0])[0][:4, 1]).all()
     assert np.isnan(display.after[0, 0]).all()
-    mean = display.pattern_[0].get_ydata()
-    np.testing.assert_allclose(mean, np.nanmean(display.after[:, :, 0], axis=0))
-    nothing = draw_synchronization(X=[np.full_like(x, np.nan) for x in X])
-    assert np.isnan(nothing.pattern_[0].get_ydata()).all()
-    nothing.figure_.canvas.draw()
+    display.figure_.canvas.draw()
 
 
 @pytest.mark.parametrize(

@@ -79,12 +79,9 @@ def test_univariate_rows_and_tables_are_accepted(bunch):
     assert display.after.shape == (5, 20, 1)
     frames = [pd.DataFrame(x[:, :2], columns=["knee", "hip"]) for x in bunch.data]
     linear = LinearSynchronizer(20).fit(frames)
-    times = linear.match(frames).times
     for X in (frames, to_frame(frames)):
-        for display in (
-            SynchronizationDisplay.from_estimator(linear, X, features="hip"),
-            SynchronizationDisplay.from_predictions(X, times, features="hip"),
-        ):
+        for estimator in (linear, Match.from_estimator(linear, X)):
+            display = SynchronizationDisplay.from_estimator(estimator, X, features="hip")
             assert display.ylabels == ["hip"]
             np.testing.assert_array_equal(display.before[2][:, 0], frames[2]["hip"])
             np.testing.assert_array_equal(display.after[0, :, 0], linear.transform(frames)[0, :, 1])
@@ -260,22 +257,19 @@ def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
 def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch, pipe):
     points = pipe[:2].transform([*bunch.data[:8], twice(bunch.data[8])])
     match = pipe[2].match(points)
-    one = SynchronizationDisplay.from_predictions(points, match, features=0)
+    one = SynchronizationDisplay.from_estimator(match, points, features=0)
     other = SynchronizationDisplay.from_estimator(pipe[2], points, features=0)
     for found, expected in zip(segments(one.intervals_), segments(other.intervals_), strict=True):
         np.testing.assert_array_equal(found, expected)
     assert is_dotted(one.offsets_) == is_dotted(other.offsets_) == match.doubtful.tolist()
     title = "offsets\nshaded: {} % intervals; dotted: 1 doubtful trial"
     assert one.axes_[-1].get_title() == other.axes_[-1].get_title() == title.format(90)
-    half = SynchronizationDisplay.from_predictions(points, match, features=0, coverage=0.5)
+    half = SynchronizationDisplay.from_estimator(match, points, features=0, coverage=0.5)
     assert half.axes_[-1].get_title() == title.format(50)
-    for plain in (
-        SynchronizationDisplay.from_predictions(points, match, features=0, coverage=None),
-        SynchronizationDisplay.from_predictions(points, match.times, features=0),
-    ):
-        assert plain.axes_[-1].get_title() == title.partition("\n")[0]
-        assert plain.intervals_ is None
-        assert not any(is_dotted(plain.offsets_))
+    plain = SynchronizationDisplay.from_estimator(match, points, features=0, coverage=None)
+    assert plain.axes_[-1].get_title() == title.partition("\n")[0]
+    assert plain.intervals_ is None
+    assert not any(is_dotted(plain.offsets_))
 
 
 def test_many_bands_are_lighter_than_few(bunch, pipe):
@@ -320,9 +314,6 @@ def test_scaled_signals_are_drawn_as_recorded_with_names_and_units():
     labels = ["vertical_force\n(body weights)", "hip_flexion (deg)"]
     assert [axis.get_ylabel() for axis in display.axes_[:4:2]] == labels
     assert [axis.get_xlabel() for axis in display.axes_] == ["", "", *["% gait cycle"] * 3]
-    known = SynchronizationDisplay.from_predictions(tables, match, **given)
-    assert [axis.get_ylabel() for axis in known.axes_[:4:2]] == labels
-    assert known.axes_[-1].get_xlabel() == "% gait cycle"
     # A model, and its band.
     for band in ("points", "trials"):
         model = ActionModelDisplay.from_estimator(pipe, tables, band=band, **given)

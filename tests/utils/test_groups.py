@@ -96,10 +96,6 @@ METHODS = {
         lambda g: SynchronizationDisplay.from_estimator(SYNC, X, y=g),
         False,
     ),
-    "SynchronizationDisplay.from_predictions(y)": (
-        lambda g: SynchronizationDisplay.from_predictions(X, SYNC.match(X).times, y=g),
-        False,
-    ),
 }
 REFUSED = [
     ([*"abcde", None], r"\[5\] is missing, None"),
