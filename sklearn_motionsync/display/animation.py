@@ -33,7 +33,6 @@ class MovingDisplay(Display):
         *,
         seconds: float = 5.0,
         fps: int = 15,
-        azimuth: float = -60,
     ) -> Animation:
         """Animate the trials.
 
@@ -46,8 +45,6 @@ class MovingDisplay(Display):
             The time until the longest trial ends.
         fps : int, default=15
             Pictures a second; each takes 10 to 50 kB of a notebook.
-        azimuth : float, default=-60
-            The direction of the viewer in degrees, as in `plot`.
 
         Returns
         -------
@@ -63,8 +60,7 @@ class MovingDisplay(Display):
                 f"seconds={seconds!r} at fps={fps!r} are {seconds * fps:.3g} pictures, more than "
                 f"{_MAX_PICTURES}; choose fewer."
             )
-        display: Any = self
-        display.plot(getattr(self, "axes_", None) if ax is None else ax, azimuth=azimuth)
+        self.plot(getattr(self, "axes_", None) if ax is None else ax)
         count = max(2, whole(seconds * fps))
         return _animate(self.figure_.canvas.figure, self._show, count, fps, closes=ax is None)
 

@@ -53,6 +53,8 @@ _N_CYCLES = 5
 _N_POINTS = 60
 # Inner and outer radius of the ring and of the arc around it, and the radius of the numbers.
 _RING, _ARC, _NUMBERS = (0.78, 1.0), (1.05, 1.13), 1.28
+# The direction of the viewer of bodies in degrees.
+_AZIMUTH = -60
 # The opacity of the ring at confidence 0.
 _MIN_OPACITY = 0.12
 
@@ -226,9 +228,7 @@ class PhaseDisplay(MovingDisplay):
             xlabel or time_label(live.frame_rate),
         ).plot(ax, frame=frame)
 
-    def plot(
-        self, ax: AxesLike | None = None, *, frame: int | None = None, azimuth: float = -60
-    ) -> Self:
+    def plot(self, ax: AxesLike | None = None, *, frame: int | None = None) -> Self:
         """Draw the state at a frame.
 
         Parameters
@@ -239,8 +239,6 @@ class PhaseDisplay(MovingDisplay):
         frame : int, default=None
             A frame of the longest trial; the others are drawn at the same time. By default
             the last.
-        azimuth : float, default=-60
-            The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
 
         Returns
         -------
@@ -250,7 +248,6 @@ class PhaseDisplay(MovingDisplay):
         longest = max((p.times for p in self.trials), key=lambda times: times[-1])
         last = len(longest) - 1
         self._time = longest[last if frame is None else as_index(frame, last + 1, "frame")]
-        self._azimuth = azimuth
         return super().plot(ax)
 
     def _has_bodies(self):
@@ -274,7 +271,7 @@ class PhaseDisplay(MovingDisplay):
         curves_from = self._has_bodies() + 1
         self.rows_ = []
         for axes, p in zip(by_row, self.trials, strict=True):
-            row = TrialRow(axes, p, self.action, self.skeleton, self.features, self._azimuth)
+            row = TrialRow(axes, p, self.action, self.skeleton, self.features)
             self.rows_.append(row)
             axes[0].set_title(fill(p.name, _LINE_LENGTH), fontsize="medium", parse_math=False)
             for axis in axes[curves_from:]:
@@ -381,15 +378,14 @@ class TrialRow:
         The skeleton of the bodies.
     features : list of str
         The labels of the curves.
-    azimuth : float
     """
 
-    def __init__(self, axes, trial, action, skeleton, features, azimuth):
+    def __init__(self, axes, trial, action, skeleton, features):
         self.axes, self._trial, self._action = list(axes), trial, action
         axes, self.body = list(axes), None
         if trial.body is not None:
             self._bodies, self._mean = (
-                project(x, skeleton, azimuth) for x in (trial.body, action.body)
+                project(x, skeleton, _AZIMUTH) for x in (trial.body, action.body)
             )
             places = [x.reshape(-1, 2) for x in (self._bodies, self._mean)]
             stage(axes[0], "", *bounds(np.concatenate(places)))

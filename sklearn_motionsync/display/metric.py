@@ -109,8 +109,8 @@ class MetricDisplay(Display):
         metric = synchronizer.metric_
         if metric is None:
             n = len(synchronizer.global_distances_)
-            names = "metric", "cost", "consensus"
-            values = ", ".join(f"{name}={getattr(synchronizer, name)!r}" for name in names)
+            settings = "metric", "cost", "consensus"
+            values = ", ".join(f"{name}={getattr(synchronizer, name)!r}" for name in settings)
             raise ValueError(
                 "There is no metric to draw, metric_ is None: DenseSynchronizer learns one with "
                 "metric='learned', cost='velocity' and consensus above 0, from at least 3 trials "

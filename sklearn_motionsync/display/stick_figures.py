@@ -392,7 +392,9 @@ class SkeletonDisplay(MovingDisplay):
         display = cls(scenes, skeleton, titles, marked=marked, behind=behind, heading=heading)
         return display.plot(ax)
 
-    def plot(self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float = -60) -> Self:
+    def plot(
+        self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float | None = None
+    ) -> Self:
         """Draw.
 
         Parameters
@@ -402,9 +404,9 @@ class SkeletonDisplay(MovingDisplay):
             makes a figure.
         at : float in [0, 1], default=0.0
             The time, as a share of the longest duration.
-        azimuth : float, default=-60
+        azimuth : float, default=None
             The direction of the viewer in degrees: 0 in front of the bodies, 90 on their left, -90
-            on their right.
+            on their right. By default that of the last plot, at first -60; `animate` keeps it.
 
         Returns
         -------
@@ -414,8 +416,9 @@ class SkeletonDisplay(MovingDisplay):
         if not 0 <= at <= 1:
             raise ValueError(f"at must be a share of the time from 0 to 1, got {at!r}.")
         self._at = at
+        self._azimuth = getattr(self, "_azimuth", -60) if azimuth is None else azimuth
         self._drawn, self._behind = (
-            [[project(x, self.skeleton, azimuth) for x in scene] for scene in scenes]
+            [[project(x, self.skeleton, self._azimuth) for x in scene] for scene in scenes]
             for scenes in (self.scenes, self.behind or [[] for _ in self.scenes])
         )
         self._gap = 0.0

@@ -207,31 +207,20 @@ class TrackingDisplay(Display):
         self._draw_progress(*self.axes_[-2:])
         any_hidden = self.hidden[:, shown].any(axis=1)
         masks = [*self.hidden[:, shown].T, any_hidden, any_hidden]
-        lost = np.asarray(self.track.lost, dtype=bool)
         grey, violet = COLORS["shadow"], COLORS["departure"]
-        self.hidden_ = [
-            [
-                axis.axvspan(*span, label="hidden", color=grey, alpha=0.7, linewidth=0, zorder=0)
-                for span in self._spans(mask)
-            ]
-            for axis, mask in zip(self.axes_, masks, strict=True)
-        ]
-        self.lost_ = [
-            [
-                axis.axvspan(
-                    *span,
-                    label="lost",
-                    facecolor="none",
-                    edgecolor=violet,
-                    hatch="///",
-                    linewidth=0,
-                    alpha=0.5,
-                    zorder=0.5,
-                )
-                for span in self._spans(lost)
-            ]
-            for axis in self.axes_
-        ]
+        self.hidden_ = self._shade(
+            masks, label="hidden", color=grey, alpha=0.7, linewidth=0, zorder=0
+        )
+        self.lost_ = self._shade(
+            [np.asarray(self.track.lost, dtype=bool)] * len(masks),
+            label="lost",
+            facecolor="none",
+            edgecolor=violet,
+            hatch="///",
+            linewidth=0,
+            alpha=0.5,
+            zorder=0.5,
+        )
         names = [fill(self.names[k], _LINE_LENGTH) for k in shown]
         ylabels, ends = [*names, "phase (%)", "rate"], (0, self.times[-1] or 1.0)
         self._label_axes(self.axes_, ylabels, self.xlabel, ends=ends)
@@ -269,8 +258,11 @@ class TrackingDisplay(Display):
         # The axis may be shared with another display.
         lower.set_ylim(0, max(lower.get_ylim()[1], 1.1 * max(1, *self.track.rates)))
 
-    def _spans(self, mask):
-        """The times of frames, up to the middle between frames, as (start, stop)."""
+    def _shade(self, masks, **style):
+        """Shade the frames of a mask in each panel, up to the middle between frames."""
         middles = (self.times[1:] + self.times[:-1]) / 2
         bounds = np.concatenate([self.times[:1], middles, self.times[-1:]])
-        return bounds[runs_of(mask)]
+        return [
+            [axis.axvspan(*span, **style) for span in bounds[runs_of(mask)]]
+            for axis, mask in zip(self.axes_, masks, strict=True)
+        ]

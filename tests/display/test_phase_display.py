@@ -80,14 +80,15 @@ def test_prediction_lasts_as_long_as_time_left(live, display):
 
 
 def test_bones_are_at_the_joints(live, display):
-    """In the view from the left, z points to the left and y up."""
-    display = PhaseDisplay.from_estimator(live, X[6], body=COSINES)
-    display.plot(display.axes_, frame=FRAME, azimuth=90)
+    """In the view from the right and the front, by 60 degrees from the front."""
+    display = PhaseDisplay.from_estimator(live, X[6], body=COSINES, frame=FRAME)
     joints = COSINES.inverse_transform(X[6])[FRAME].reshape(-1, 3)
     skeleton = COSINES.skeleton
     knee, ankle = (skeleton.joints.index(f"left_{name}") for name in ("knee", "ankle"))
+    x, y, z = joints[[knee, ankle]].T
+    bone = np.column_stack([x / 2 + z * np.sqrt(3) / 2, y])
     segments = np.round(ends_of_bones(display.rows_[0].body.bones["left"]), 9).tolist()
-    assert np.round(joints[[knee, ankle]][:, [2, 1]] * [-1, 1], 9).tolist() in segments
+    assert np.round(bone, 9).tolist() in segments
 
 
 def test_other_frames_and_animation(live, display):

@@ -67,6 +67,8 @@ def test_bones_seen_from_the_front_and_from_the_right():
         assert sorted(map(np.ndarray.tolist, drawn.round(9))) == sorted(
             map(np.ndarray.tolist, expected.round(9))
         )
+        display.animate(seconds=0.2, fps=10)
+        np.testing.assert_array_equal(bones_drawn(display, 0, "left"), drawn)
         head = np.ravel(display.heads_[0].get_data())
         np.testing.assert_allclose(head, joints["head"][[column, 1]], atol=1e-9)
         assert len(bones_drawn(display, 0)) == len(skeleton.bones)
