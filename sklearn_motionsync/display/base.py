@@ -282,7 +282,11 @@ def legend_above(top, handles, labels=None, title=None, below=None, n_cols=6):
             a.set_title(a.get_title() or " ", fontsize=a.title.get_fontsize(), pad=pad)
     if axis.figure.get_layout_engine() is None:
         for a in in_row:
-            _lower(a, needed)
+            # By half of their height at most.
+            spec = a.get_subplotspec()
+            box = a.get_position() if spec is None else spec.get_position(a.figure)
+            lowered = min(needed / a.figure.bbox.height, box.height / 2)
+            a.set_position([box.x0, box.y0, box.width, box.height - lowered])
     return legend
 
 
@@ -309,14 +313,6 @@ def _legend(axis, handles, labels, title, n_cols, room, size):
         legend.set_title(fill(title, max(int(len(title) * room / box.width), 12)))
         box = legend.get_window_extent()
     return legend, box
-
-
-def _lower(axis, height):
-    """Make axes lower at the top by some pixels, by half of their height at most."""
-    spec, figure = axis.get_subplotspec(), axis.figure
-    box = axis.get_position() if spec is None else spec.get_position(figure)
-    height = min(height / figure.bbox.height, box.height / 2)
-    axis.set_position([box.x0, box.y0, box.width, box.height - height])
 
 
 def _escape(label):

@@ -11,7 +11,6 @@ from sklearn.base import BaseEstimator
 
 from ..body.formats import SIDES
 from ..inputs.facts import units_of_columns
-from ..inputs.features import choose_features
 from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import TrialsLike, Unit
 from ..inputs.wording import counted
@@ -25,7 +24,7 @@ from ..takes.cycles import (
     start_curves,
 )
 from ..takes.self_correlation import SelfCorrelation, required_strength
-from .arguments import as_index, labels_of_signals
+from .arguments import labels_of_signals
 from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, legend_above
 
 __all__ = ["CycleDisplay"]
@@ -77,7 +76,7 @@ class CycleDisplay(Display):
     >>> from sklearn_motionsync.datasets import make_gait
     >>> bunch = make_gait(3, n_cycles=4, takes=True, random_state=0)
     >>> segmenter = CycleSegmenter(start=0).fit(bunch.data)
-    >>> CycleDisplay.from_estimator(segmenter, bunch.data, take=1).cuts.tolist()
+    >>> CycleDisplay.from_estimator(segmenter, bunch.data[1:]).cuts.tolist()
     [99, 202, 306, 410]
     """
 
@@ -99,8 +98,6 @@ class CycleDisplay(Display):
         estimator: BaseEstimator,
         X: TrialsLike,
         *,
-        take: int = 0,
-        feature: int | str | None = None,
         unit: Unit = "frames",
         frame_rate: float | None = None,
         ylabel: str | Mapping[str, str] | None = None,
@@ -115,12 +112,9 @@ class CycleDisplay(Display):
         estimator : CycleSegmenter
             Before a fit the self-correlation is drawn without cuts.
         X : takes
-            As the estimator takes them.
-        take : int, default=0
-            The index of the take.
-        feature : int or str, default=None
-            A compared feature, by index or name. By default the curve that defines the beginning
-            of a cycle: the distance of a foot ahead of the pelvis in leg lengths, or a feature.
+            As the estimator takes them; the first one is drawn. Its curve is the one that defines
+            the beginning of a cycle: the distance of a foot ahead of the pelvis in leg lengths, or
+            a feature.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time; ``"percent"`` is of the take.
         frame_rate : float, default=None
@@ -141,28 +135,27 @@ class CycleDisplay(Display):
         Raises
         ------
         ValueError
-            If there is no such take or feature, or the takes break the contract.
+            If the takes break the contract.
         """
         if not isinstance(estimator, CycleSegmenter):
             raise ValueError(f"Give a CycleSegmenter, got {type(estimator).__name__}.")
         fitted = hasattr(estimator, "pattern_")
         segmenter = CycleSegmenter(**estimator.get_params()).set_params(not_cyclic="skip")
         recordings, takes = check_takes(segmenter, X, reset=True)
-        i = as_index(take, len(takes), "take")
-        (x,), (repeats,) = correlate_takes(segmenter, recordings[i : i + 1], takes[i : i + 1])
+        (x,), (repeats,) = correlate_takes(segmenter, recordings[:1], takes[:1])
         longest = (as_learnt(estimator, x, repeats) if fitted else repeats).correlation
-        row = segmenter.report(recordings[i : i + 1]).iloc[0]
-        learnt = estimator if fitted else None
-        name, curve = _curve_of(segmenter, learnt, recordings[i], x, feature)
+        row = segmenter.report(recordings[:1]).iloc[0]
+        segmenter.set_params(start=estimator.start_ if fitted else estimator.start)
+        name, curve = _curve_of(segmenter, recordings[0], x)
         cuts, cycles = np.array([], dtype=int), ""
         if fitted and row["cyclic"]:
-            _, origin = estimator.segment(recordings[i : i + 1])
+            _, origin = estimator.segment(recordings[:1])
             whole = origin[origin["complete"]]
             cuts = np.unique([whole["start"], whole["stop"] - 1])
             cycles = counted(len(whole), "whole cycle")
-        facts = TrialFacts.of([recordings[i]], frame_rate)
+        facts = TrialFacts.of([recordings[0]], frame_rate)
         lasting = facts.durations() if unit == "seconds" else None
-        (label,) = labels_of_signals([name], units_of_columns(recordings[i]), ylabel, units)
+        (label,) = labels_of_signals([name], units_of_columns(recordings[0]), ylabel, units)
         period = f"period {longest.period:.1f} frames" if row["period"] > 0 else ""
         several = f"{len(row['stretches'])} stretches" if len(row["stretches"]) > 1 else ""
         found = filter(None, [row["reason"], several, period, cycles])
@@ -225,15 +218,11 @@ class CycleDisplay(Display):
         self._label_axes([lower], [self.label], time, ends=times)
 
 
-def _curve_of(segmenter, fitted, take, x, feature):
+def _curve_of(segmenter, take, x):
     """The name and the values of the curve of a take."""
-    names = compared_names(segmenter)
-    if feature is None:
-        start = segmenter.start if fitted is None else fitted.start_
-        curves = start_curves(segmenter.set_params(start=start), [take], [x])
-        if curves is not None:
-            name, (curve,) = next(iter(curves.items()))
-            is_foot = segmenter.skeleton is not None and name in SIDES
-            return f"{name} ankle ahead (legs)" if is_foot else name, curve
-    (k,) = choose_features([0 if feature is None else feature], names)
-    return names[k], x[:, k]
+    curves = start_curves(segmenter, [take], [x])
+    if curves is None:
+        return compared_names(segmenter)[0], x[:, 0]
+    name, (curve,) = next(iter(curves.items()))
+    is_foot = segmenter.skeleton is not None and name in SIDES
+    return f"{name} ankle ahead (legs)" if is_foot else name, curve

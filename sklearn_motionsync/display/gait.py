@@ -146,7 +146,14 @@ class GaitDisplay(Display):
         *feet, bars = self.axes_
         self.stances_ = {side: self._stances(side) for side in sides}
         for axis, side in zip(feet, sides, strict=True):
-            self._draw_foot(axis, side)
+            for end, style in (("heel", "-"), ("toe", "--")):
+                if f"{side}_{end}" in self.heights:
+                    height = self.heights[f"{side}_{end}"]
+                    axis.plot(self.times, height, style, color=_COLORS[side])
+            for label, style in _STYLES.items():
+                for time in self._times_of(side, label):
+                    axis.axvline(time, color="black", linestyle=style, linewidth=0.9)
+            axis.set_title(f"{side} foot", fontsize="medium")
         for k, side in enumerate(reversed(sides)):
             bars.broken_barh(self.stances_[side], (k - 0.35, 0.7), facecolors=_COLORS[side])
         bars.set_yticks(range(len(sides)), list(reversed(sides)))
@@ -185,12 +192,3 @@ class GaitDisplay(Display):
             elif following == np.inf:
                 spans.append((float(begin), float(self.times[-1] - begin)))
         return spans
-
-    def _draw_foot(self, axis, side):
-        for end, style in (("heel", "-"), ("toe", "--")):
-            if f"{side}_{end}" in self.heights:
-                axis.plot(self.times, self.heights[f"{side}_{end}"], style, color=_COLORS[side])
-        for label, style in _STYLES.items():
-            for time in self._times_of(side, label):
-                axis.axvline(time, color="black", linestyle=style, linewidth=0.9)
-        axis.set_title(f"{side} foot", fontsize="medium")

@@ -19,7 +19,7 @@ from ..inputs.keyframes import Keyframes
 from ..inputs.types import Features, Labels, NumbersLike, TrialsLike, Unit
 from ..inputs.wording import counted
 from ..matching.counting import first_largest
-from ..synchronizers.match import Match, check_coverage
+from ..synchronizers.match import Match
 from .arguments import labels_of_signals
 from .base import (
     COLORS,
@@ -42,7 +42,8 @@ __all__ = ["GroupCurves", "GroupDisplay", "NormDisplay"]
 
 # Signals that are shown when none are named; of more, the first few.
 _MOST = 6
-# Titles of the legend.
+# Probability of the interval of a mean, and titles of the legend.
+_COVERAGE = 0.95
 _STATISTICS = {
     "sd": "mean ± standard deviation of {whom}",
     "se": "mean ± standard error of {whom}",
@@ -183,7 +184,6 @@ class GroupDisplay(Display):
         signals: TrialsLike | None = None,
         features: Features | None = None,
         statistic: Literal["sd", "se", "interval"] = "sd",
-        coverage: float = 0.95,
         trials: bool = False,
         comparison: GroupComparison | None = None,
         events: NumbersLike | pd.DataFrame | None = None,
@@ -216,9 +216,7 @@ class GroupDisplay(Display):
         statistic : {"sd", "se", "interval"}, default="sd"
             The band about the mean of a group, at each frame: ``"sd"``, the standard deviation of
             people; ``"se"``, the standard error of the mean; ``"interval"``, the interval of the
-            mean by Student's t.
-        coverage : float, default=0.95
-            Probability of ``"interval"``.
+            mean by Student's t, of 95 %.
         trials : bool, default=False
             Whether to draw all trials, thin.
         comparison : GroupComparison, default=None
@@ -251,8 +249,8 @@ class GroupDisplay(Display):
         Raises
         ------
         ValueError
-            If there is no such statistic, coverage, feature or unit; labels or units do not fit the
-            signals; the comparison is in another unit; or as from `compare_groups`.
+            If there is no such statistic, feature or unit; labels or units do not fit the signals;
+            the comparison is in another unit; or as from `compare_groups`.
 
         See Also
         --------
@@ -260,7 +258,6 @@ class GroupDisplay(Display):
         """
         if statistic not in _STATISTICS:
             raise ValueError(f"statistic must be one of {list(_STATISTICS)}, got {statistic!r}.")
-        check_coverage(coverage)
         if comparison is not None and comparison.unit != unit:
             raise ValueError(
                 f"The comparison is in {comparison.unit}, and the figure in {unit}. Set "
@@ -293,20 +290,8 @@ class GroupDisplay(Display):
         offsets = of_people.means(aligned.offsets - aligned.offsets.mean(axis=0))
         shown = aligned.curves[:, :, chosen]
         whom = "trials" if groups is None else "people"
-        title = _STATISTICS[statistic].format(whom=whom, share=100 * coverage)
-        of_groups = []
-        for label, (color, line), maker, curves_of_people, offsets_of_people in zip(
-            of_people.describe(groups is not None),
-            group_styles(of_people.labels).values(),
-            of_people.makers,
-            of_people.means(shown),
-            offsets,
-            strict=True,
-        ):
-            panels = np.concatenate([curves_of_people, offsets_of_people[:, :, np.newaxis]], axis=2)
-            mean, half = band_of_mean(panels, statistic, coverage)
-            drawn = shown[maker.any(axis=0)] if trials else None
-            of_groups.append(GroupCurves(mean, mean - half, mean + half, drawn, label, color, line))
+        title = _STATISTICS[statistic].format(whom=whom, share=100 * _COVERAGE)
+        of_groups = _curves_of_groups(of_people, shown, offsets, statistic, trials, groups)
         return cls(
             of_groups,
             offsets,
@@ -423,6 +408,24 @@ class GroupDisplay(Display):
             )
             self.clusters_.append(axis.add_collection(lines, autolim=False))
         return [lines for lines in self.clusters_ if len(lines.get_segments())]
+
+
+def _curves_of_groups(of_people, shown, offsets, statistic, trials, groups):
+    """The curves of each group in the panels of the signals and of the offsets."""
+    of_groups = []
+    for label, (color, line), maker, curves_of_people, offsets_of_people in zip(
+        of_people.describe(groups is not None),
+        group_styles(of_people.labels).values(),
+        of_people.makers,
+        of_people.means(shown),
+        offsets,
+        strict=True,
+    ):
+        panels = np.concatenate([curves_of_people, offsets_of_people[:, :, np.newaxis]], axis=2)
+        mean, half = band_of_mean(panels, statistic, _COVERAGE)
+        drawn = shown[maker.any(axis=0)] if trials else None
+        of_groups.append(GroupCurves(mean, mean - half, mean + half, drawn, label, color, line))
+    return of_groups
 
 
 def _events_on_clock(events, aligned, of_people):

@@ -166,9 +166,6 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
         bodies[..., 1] -= floor
         shadows[..., 1] -= floor
     verdict = "accepted" if is_accepted else "not accepted"
-    if is_accepted and _departs_outside_aspace(view, i, limbs.columns):
-        note += ": the model sees what the aSpace keeps, "
-        note += "which leaves out how far some limbs depart"
     whose = "a new person" if reference is None else "this person"
     rare = [describe_departure(row) for row in rows if row.rare and row.limb is not None]
     heading = (
@@ -194,12 +191,3 @@ def split_at_synchronizer(estimator):
         # Raises an error that names the steps.
         find_step(before, DirectionCosines)
     return before, views
-
-
-def _departs_outside_aspace(view, i, columns):
-    """Whether limbs depart beyond what is rare, but not in the aSpace of the model."""
-    deviations = (x[i] - view.model.mean_ for x in (view.whole, view.synchronised))
-    largest, largest_in_aspace = (
-        np.abs(z[:, columns] / view.predicted[:, columns]).max() for z in deviations
-    )
-    return largest > view.model.simultaneous_factor() >= largest_in_aspace

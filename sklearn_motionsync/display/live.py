@@ -250,12 +250,10 @@ class PhaseDisplay(MovingDisplay):
         self._time = longest[last if frame is None else as_index(frame, last + 1, "frame")]
         return super().plot(ax)
 
-    def _has_bodies(self):
-        return self.trials[0].body is not None
-
     def _layout(self):
         # Two panels beside each other; an odd last one has the whole width.
-        n_panels, count = self._has_bodies() + 2 + len(self.features), len(self.trials)
+        has_bodies, count = self.skeleton is not None, len(self.trials)
+        n_panels = has_bodies + 2 + len(self.features)
         places = [divmod(i, 2) for i in range(n_panels)]
         if n_panels % 2:
             places[-1] = (n_panels // 2, slice(None))
@@ -268,7 +266,7 @@ class PhaseDisplay(MovingDisplay):
         # The latest time observed or predicted.
         end = max((p.times + np.where(p.phases.phase < last, p.left, 0)).max() for p in self.trials)
         by_row = np.array(self.axes_, dtype=object).reshape(len(self.trials), -1)
-        curves_from = self._has_bodies() + 1
+        curves_from = (self.skeleton is not None) + 1
         self.rows_ = []
         for axes, p in zip(by_row, self.trials, strict=True):
             row = TrialRow(axes, p, self.action, self.skeleton, self.features)

@@ -45,8 +45,8 @@ _PANELS_A_ROW = 4
 _HEADING, _LINE_LENGTH = 0.6, 78
 # The distance of bodies side by side, in heights of the tallest.
 _SPACING = 0.7
-# The number of trials by default.
-_N_TRIALS = 6
+# The number of trials by default, and of random poses of a model.
+_N_TRIALS, _N_SAMPLES = 6, 12
 
 
 @dataclass(eq=False, repr=False)
@@ -261,11 +261,10 @@ class SkeletonDisplay(MovingDisplay):
         estimator: BaseEstimator,
         *,
         frames: Sequence[float] | np.ndarray = (0.1, 0.4),
-        n_samples: int = 12,
         random_state: RandomState = None,
         ax: AxesLike | None = None,
     ) -> Self:
-        """Draw mean poses of a model, and random poses that it accepts (Fig. 4).
+        """Draw mean poses of a model, and of twelve random poses those that it accepts (Fig. 4).
 
         Parameters
         ----------
@@ -274,8 +273,6 @@ class SkeletonDisplay(MovingDisplay):
             synchronizer need ``inverse_transform``.
         frames : list of int or float, default=(0.1, 0.4)
             Frames of the model; fractions below 1 are shares of the action.
-        n_samples : int, default=12
-            The number of random poses at each frame; those that the model accepts are drawn.
         random_state : int, RandomState instance or None, default=None
             Determines the random poses; None draws others each time.
         ax : Axes or array-like of Axes, default=None
@@ -308,8 +305,12 @@ class SkeletonDisplay(MovingDisplay):
         floor = np.zeros(skeleton.n_dims)
         floor[1] = bodies_of(mean)[..., 1].min()
         scenes, titles = [], []
-        for frame in _frames_of_model(frames, model.n_frames_):
-            samples = model.sample(n_samples, frame=frame, random_state=random_state)
+        listed, last = [frames] if isinstance(frames, Real) else frames, model.n_frames_ - 1
+        if isinstance(listed, (list, tuple, np.ndarray)):
+            listed = [whole(f * last) if isinstance(f, Real) and 0 < f < 1 else f for f in listed]
+        what = "frames, those that are no shares between 0 and 1,"
+        for frame in as_indices(listed, model.n_frames_, what):
+            samples = model.sample(_N_SAMPLES, frame=frame, random_state=random_state)
             accepted = model.accepts(samples, frame)
             for points in (mean[[frame]], samples[accepted, :width]):
                 scenes.append([x[np.newaxis] - floor for x in bodies_of(points)])
@@ -340,7 +341,7 @@ class SkeletonDisplay(MovingDisplay):
         Titles tell the most important departure: the limb, and by how much it is off, late, or
         moves too little or too far. The heading says whether the model accepts the trial, and
         what is rare; it may accept it although limbs depart, because it evaluates only what the
-        `ASpace` keeps, and the heading then says so.
+        `ASpace` keeps.
 
         Parameters
         ----------
@@ -487,13 +488,3 @@ class SkeletonDisplay(MovingDisplay):
                 x[whole(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
             ]
             panel.show(bodies, [x[whole(at * (len(x) - 1))] for x in behind])
-
-
-def _frames_of_model(frames, n_frames):
-    """Frames by index, or as shares of the action between 0 and 1."""
-    listed = [frames] if isinstance(frames, Real) else frames
-    if isinstance(listed, (list, tuple, np.ndarray)):
-        listed = [
-            whole(f * (n_frames - 1)) if isinstance(f, Real) and 0 < f < 1 else f for f in listed
-        ]
-    return as_indices(listed, n_frames, "frames, those that are no shares between 0 and 1,")

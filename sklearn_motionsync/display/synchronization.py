@@ -13,7 +13,7 @@ from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import nanmean
 from ..inputs.types import Features, Labels, TrialsLike, Unit
 from ..inputs.wording import counted
-from ..synchronizers.match import Match, check_coverage
+from ..synchronizers.match import Match
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .arguments import labels_of_signals, undo_scaling
@@ -36,6 +36,8 @@ __all__ = ["SynchronizationDisplay"]
 
 # The dots of doubtful trials, in line widths, and their opacity.
 _DOTTED, _STRONG = (0, (1, 1.4)), 0.9
+# Probability of the intervals around offsets.
+_COVERAGE = 0.9
 # The opacity of a band, at least and at most; and of all bands where they overlap.
 _FAINTEST, _BAND, _BANDS = 0.01, 0.2, 0.4
 
@@ -66,8 +68,6 @@ class SynchronizationDisplay(Display):
         The titles of the panels before and after.
     groups : list of str, default=None
         The group of each trial, which determines its colour.
-    coverage : float or None, default=0.9
-        Probability of the intervals around the offsets, as of `from_estimator`.
 
     Attributes
     ----------
@@ -110,7 +110,6 @@ class SynchronizationDisplay(Display):
     pattern: np.ndarray
     titles: tuple[str, str]
     groups: Sequence[str] | None = None
-    coverage: float | None = 0.9
 
     def __repr__(self):
         count = counted(len(self.before), "trial")
@@ -129,7 +128,6 @@ class SynchronizationDisplay(Display):
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         xlabel: str | None = None,
         warps: bool = True,
-        coverage: float | None = 0.9,
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
@@ -156,12 +154,10 @@ class SynchronizationDisplay(Display):
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         warps : bool, default=True
-            Whether to draw the offsets, in a panel of their own.
-        coverage : float or None, default=0.9
-            Probability of the intervals of `Match.interval`, which are bands around the offsets.
-            Trials that are `Match.doubtful` are dotted in all panels. None: neither is
-            drawn. Nor is it if the match does not tell: only those of a `DenseSynchronizer` or
-            `PartSynchronizer` do.
+            Whether to draw the offsets, in a panel of their own. The bands around them are the
+            intervals of 90 % of `Match.interval`. Trials that are `Match.doubtful` are dotted in
+            all panels. Neither is drawn if the match does not tell: only those of a
+            `DenseSynchronizer` or `PartSynchronizer` do.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
@@ -175,8 +171,6 @@ class SynchronizationDisplay(Display):
         SynchronizationDisplay
             The display, drawn.
         """
-        if coverage is not None:
-            check_coverage(coverage)
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         before, synchronizer, trials = reached[:3]
         width = trials[0].shape[1]
@@ -203,7 +197,6 @@ class SynchronizationDisplay(Display):
             undo(synchronizer.pattern_)[:, chosen],
             ("as recorded", "the pattern" if index is None else f"the pattern, trial {index}"),
             None if y is None else names_of_groups(y, len(shown), name="y"),
-            coverage,
         ).plot(ax, warps=warps)
 
     def plot(self, ax: AxesLike | None = None, *, warps: bool = True) -> Self:
@@ -227,9 +220,8 @@ class SynchronizationDisplay(Display):
 
     @property
     def doubtful(self) -> np.ndarray | None:
-        """Which trials are doubtful; None if the match does not tell, or without coverage."""
-        tells = self.coverage is not None and self.match.intervals is not None
-        return self.match.doubtful if tells else None
+        """Which trials are doubtful; None if the match does not tell."""
+        return None if self.match.intervals is None else self.match.doubtful
 
     def _layout(self):
         n_rows = len(self.ylabels)
@@ -251,7 +243,12 @@ class SynchronizationDisplay(Display):
             before, after = [x[:, row] for x in self.before], self.after[:, :, row]
             self.before_.append(self._draw_trials(left, times, before, colors))
             self.after_.append(self._draw_trials(right, [clock] * len(after), after, colors))
-            self.group_means_.append(self._draw_means(right, clock, row, styles))
+            self.group_means_.append([])
+            for name, (color, line) in styles.items():
+                members = np.array(self.groups) == name
+                curve = nanmean(self.after[members, :, row], axis=0)
+                line = front_line(right, clock, curve, color=color, linestyle=line)
+                self.group_means_[-1].append(line)
             self.pattern_ += right.plot(
                 clock,
                 self.pattern[:, row],
@@ -292,24 +289,15 @@ class SynchronizationDisplay(Display):
             axis, xs, ys, colors=colors, linestyles=linestyles, linewidths=linewidths, alpha=alpha
         )
 
-    def _draw_means(self, axis, clock, row, styles):
-        """Draw the mean of each group in front of its trials."""
-        means = []
-        for name, (color, line) in styles.items():
-            members = np.array(self.groups) == name
-            curve = nanmean(self.after[members, :, row], axis=0)
-            means.append(front_line(axis, clock, curve, color=color, linestyle=line))
-        return means
-
     def _draw_offsets(self, axis, clock, colors):
         """Draw offsets from their mean, and bands around them if the match tells intervals."""
-        coverage = None if self.doubtful is None else self.coverage
+        coverage = None if self.doubtful is None else _COVERAGE
         offsets, bands = self.match.offsets_in(self.axis.unit, coverage=coverage), ""
         if coverage is not None:
             offsets, lower, upper = offsets
             bounds = lower - offsets.mean(axis=0), upper - offsets.mean(axis=0)
             self.intervals_ = self._draw_intervals(axis, clock, *bounds, colors)
-            bands = f"shaded: {100 * self.coverage:g} % intervals"
+            bands = f"shaded: {100 * _COVERAGE:g} % intervals"
         mean = offsets.mean(axis=0)
         self.offsets_ = self._draw_trials(axis, [clock] * len(offsets), offsets - mean, colors)
         axis.axhline(0, color=COLORS["pattern"], linestyle="--", linewidth=1)

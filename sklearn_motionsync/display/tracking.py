@@ -204,7 +204,14 @@ class TrackingDisplay(Display):
         self.estimates_, self.bands_, self.truths_, self.observed_ = empty_lists(4)
         for axis, k in zip(self.axes_, shown, strict=False):
             self._draw_feature(axis, k)
-        self._draw_progress(*self.axes_[-2:])
+        upper, lower = self.axes_[-2:]
+        phases, blue = 100 * self.track.phases / (self.n_frames - 1), COLORS["trial"]
+        upper.set_ylim(-3, 103)
+        (self.phase_,) = upper.plot(self.times, phases, color=blue)
+        lower.axhline(1, color=COLORS["envelope"], linewidth=1, linestyle="--")
+        (self.rate_,) = lower.plot(self.times, self.track.rates, color=blue)
+        # The axis may be shared with another display.
+        lower.set_ylim(0, max(lower.get_ylim()[1], 1.1 * max(1, *self.track.rates)))
         any_hidden = self.hidden[:, shown].any(axis=1)
         masks = [*self.hidden[:, shown].T, any_hidden, any_hidden]
         grey, violet = COLORS["shadow"], COLORS["departure"]
@@ -248,15 +255,6 @@ class TrackingDisplay(Display):
         self.estimates_ += axis.plot(times, estimate, color=blue, linewidth=1.8, label="estimate")
         seen = self.observed[:, k]
         self.observed_ += axis.plot(times, seen, ".", color=black, markersize=2.5, label="seen")
-
-    def _draw_progress(self, upper, lower):
-        phases, blue = 100 * self.track.phases / (self.n_frames - 1), COLORS["trial"]
-        upper.set_ylim(-3, 103)
-        (self.phase_,) = upper.plot(self.times, phases, color=blue)
-        lower.axhline(1, color=COLORS["envelope"], linewidth=1, linestyle="--")
-        (self.rate_,) = lower.plot(self.times, self.track.rates, color=blue)
-        # The axis may be shared with another display.
-        lower.set_ylim(0, max(lower.get_ylim()[1], 1.1 * max(1, *self.track.rates)))
 
     def _shade(self, masks, **style):
         """Shade the frames of a mask in each panel, up to the middle between frames."""

@@ -199,18 +199,7 @@ def _bodies_of(reached, X, params):
 
 
 def add_player_of(page, trials, X, params, skeleton):
-    """Add the player of a report, where there are bodies.
-
-    Parameters
-    ----------
-    page : Page
-    trials : TrialSet
-    X : trials, as the first step takes them
-    params : dict
-        As for `transform_through`.
-    skeleton : Skeleton or None
-        Of the joint positions X; None: that of a step of the pipeline.
-    """
+    """Add the player of a report, where there are bodies."""
     if skeleton is None:
         X, skeleton = _bodies_of(trials.aligned.reached, X, params)
     if skeleton is None:
@@ -253,7 +242,10 @@ def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
     bones, dots = bodies[0][1:]
     lengths = np.array([len(points) for points, _, _ in bodies])
     width = int(np.prod(bodies[0][0].shape[1:]))
-    longest, positions = _longest(lengths, max(MOST_COORDINATES // width, 2 * len(bodies))), []
+    most, counts = max(MOST_COORDINATES // width, 2 * len(bodies)), range(2, lengths.max() + 1)
+    # The largest number of frames of a trial with which all have so many frames together.
+    longest = bisect_right(counts, most, key=lambda n: np.minimum(lengths, n).sum()) + 1
+    longest, positions = max(longest, 2), []
     for points, _, _ in bodies:
         if len(points) > longest:
             even = match_of_times([np.arange(float(longest))], 1)
@@ -324,12 +316,6 @@ def _points(x, skeleton, i):
         head = landmark_track(body, skeleton, "head")[:, np.newaxis]
         points = np.concatenate([points, head], axis=1)
     return points, bones, dots
-
-
-def _longest(lengths, most):
-    """The largest number of frames of a trial with which all have so many frames together."""
-    counts = range(2, max(lengths) + 1)
-    return max(bisect_right(counts, most, key=lambda n: np.minimum(lengths, n).sum()) + 1, 2)
 
 
 def _packed(values, dtype):

@@ -149,13 +149,7 @@ def write_report(
     path = check_path(path, "report.html")
     with own_figures():
         aligned = AlignedCurves.of(
-            estimator,
-            X,
-            params,
-            "write_report",
-            signals=signals,
-            features=features,
-            unit=unit,
+            estimator, X, params, "write_report", signals=signals, features=features, unit=unit
         )
         comparison = None
         labels = None if covariate else y

@@ -70,7 +70,7 @@ def test_any_part_is_drawn_and_animated(joints, axes):
 def test_model_and_departures_of_any_part(joints, axes):
     X, skeleton = part_of(joints, axes)
     pipe = pipeline(skeleton).fit(X)
-    display = SkeletonDisplay.from_model(pipe, frames=[5], n_samples=4)
+    display = SkeletonDisplay.from_model(pipe, frames=[5])
     assert display.skeleton == skeleton
     mean = bones_drawn(display, 0)
     assert len(mean) == len(skeleton.bones)

@@ -18,9 +18,7 @@ def segmenter():
 
 def test_artists_agree_with_the_estimator(segmenter):
     take = GAIT.data[1]
-    display = CycleDisplay.from_estimator(
-        segmenter, GAIT.data, take=1, unit="seconds", frame_rate=100
-    )
+    display = CycleDisplay.from_estimator(segmenter, GAIT.data[1:], unit="seconds", frame_rate=100)
     found = self_correlation(take)
     np.testing.assert_array_equal(display.correlation_.get_ydata(), found.correlation)
     np.testing.assert_allclose(display.peaks_.get_xdata(), found.peaks / 100)
@@ -37,11 +35,11 @@ def test_artists_agree_with_the_estimator(segmenter):
     cycles = len(cuts) - 1
     assert repr(display).endswith(f"period {found.period:.1f} frames, {cycles} whole cycles)")
     other = CycleDisplay.from_estimator(
-        segmenter, GAIT.data, feature="x2", unit="percent", ylabel="ankle", units="deg", xlabel="%"
+        segmenter, GAIT.data, unit="percent", ylabel="ankle", units="deg", xlabel="%"
     )
     assert other.axes_[1].get_ylabel() == "ankle (deg)"
     assert other.axes_[1].get_xlabel() == "%"
-    np.testing.assert_array_equal(other.curve_.get_ydata(), GAIT.data[0][:, 2])
+    np.testing.assert_array_equal(other.curve_.get_ydata(), GAIT.data[0][:, HIP])
     assert other.curve_.get_xdata()[-1] == 100
 
 
@@ -55,8 +53,6 @@ def test_a_take_without_cycles_is_drawn_without_cuts():
 
 def test_from_estimator_refuses(segmenter):
     for change, message in (
-        ({"take": 2}, "take must be from 0 to 1, got"),
-        ({"feature": "knee"}, "no feature 'knee'"),
         ({"unit": "hours"}, "unit must be one of"),
         ({"unit": "seconds"}, "The frame rate of .* is not known"),
     ):

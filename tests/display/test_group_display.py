@@ -185,7 +185,6 @@ def test_signals_are_what_reaches_an_aspace():
     ("given", "message"),
     [
         ({"statistic": "sem"}, "statistic must be one of"),
-        ({"coverage": 95}, "coverage must be a probability"),
         ({"features": "elbow"}, "There is no feature 'elbow'"),
         ({"ylabel": ["a"]}, "ylabel must be a list of text, one for each of the 4 signals"),
         ({"units": {"elbow": "deg"}}, "units: there is no signal 'elbow'; there are hip_flexion"),

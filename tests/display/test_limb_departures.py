@@ -235,17 +235,3 @@ def test_from_departures_refuses_pipelines_without_limbs(bunch, pipe):
         SkeletonDisplay.from_departures(odd, bunch.data)
     with pytest.raises(TypeError, match="from_departures got 'keyframes'"):
         SkeletonDisplay.from_departures(pipe, bunch.data, keyframes=bunch.keyframes)
-
-
-def test_heading_tells_departures_outside_the_aspace(bunch):
-    """Neither of the two components moves the neck sideways."""
-    steps = DirectionCosines(bunch.skeleton), ASpace(2), LinearSynchronizer(40), ActionModel()
-    pipe = make_pipeline(*steps).fit(bunch.data)
-    tilted = bunch.data[3].reshape(-1, 15, 3).copy()
-    tilted[:, PAPER.index_of("head"), 0] += 0.15
-    display = SkeletonDisplay.from_departures(pipe, [tilted.reshape(-1, 45), bunch.data[3]])
-    assert "neck" in display.titles[0]
-    assert find_departures(pipe, [tilted.reshape(-1, 45)]).rare.any()
-    assert "is accepted: the model sees what the aSpace keeps," in display.heading
-    plain = SkeletonDisplay.from_departures(pipe, [tilted.reshape(-1, 45), bunch.data[3]], trial=1)
-    assert "Trial 1 is accepted.\n" in plain.heading

@@ -136,10 +136,10 @@ def test_place_heading_and_vertical_axis_have_no_effect():
 
 
 def test_from_model_draws_mean_and_accepted_poses(pipe):
-    display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), n_samples=5).plot(azimuth=0)
+    display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), random_state=0).plot(azimuth=0)
     titles = [axis.get_title() for axis in display.axes_]
     assert [title.split("\n")[0] for title in titles] == ["frame 4"] * 2 + ["frame 20"] * 2
-    assert [len(bones_drawn(display, panel)) for panel in range(4)] == [14, 5 * 14, 14, 5 * 14]
+    assert [len(bones_drawn(display, panel)) for panel in range(4)] == [14, 12 * 14, 14, 12 * 14]
     mean = pipe[:2].inverse_transform(pipe[-1].mean_).reshape(40, 15, 3)
     mean[..., 1] -= mean[..., 1].min()
     for panel, frame in ((0, 4), (2, 20)):

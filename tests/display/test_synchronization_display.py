@@ -187,9 +187,9 @@ def band(clock, lower, upper):
     return np.column_stack([[*xs, xs[0]], [*ys, ys[0]]])
 
 
-def check_bands(display, match, coverage, *args):
+def check_bands(display, match, *args):
     """The intervals of a match, from the mean of the offsets."""
-    offsets, lower, upper = match.offsets_in(*(args or ["frames"]), coverage=coverage)
+    offsets, lower, upper = match.offsets_in(*(args or ["frames"]), coverage=0.9)
     lower, upper = lower - offsets.mean(axis=0), upper - offsets.mean(axis=0)
     bands = segments(display.intervals_)
     assert len(bands) == len(lower)
@@ -199,23 +199,18 @@ def check_bands(display, match, coverage, *args):
 
 def test_bands_are_the_intervals_of_the_match(bunch, pipe):
     match = Match.from_estimator(pipe, bunch.data)
-    for coverage in (0.5, np.float32(0.75)):
-        display = SynchronizationDisplay.from_estimator(
-            pipe, bunch.data, features=0, coverage=coverage
-        )
-        check_bands(display, match, coverage)
-        title = display.axes_[-1].get_title()
-        assert title.endswith(f"shaded: {100 * coverage:g} % intervals")
-        assert display.intervals_.get_zorder() < display.offsets_.get_zorder()
-    check_bands(SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0), match, 0.9)
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0)
+    check_bands(display, match)
+    assert display.axes_[-1].get_title().endswith("shaded: 90 % intervals")
+    assert display.intervals_.get_zorder() < display.offsets_.get_zorder()
 
 
 def test_bands_have_the_unit_of_the_offsets(bunch, pipe):
     match, seconds = Match.from_estimator(pipe, bunch.data), {"unit": "seconds", "frame_rate": 50}
     display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0, unit="percent")
-    check_bands(display, match, 0.9, "percent")
+    check_bands(display, match, "percent")
     display = SynchronizationDisplay.from_estimator(pipe, bunch.data, **seconds)
-    check_bands(display, match, 0.9, "seconds", bunch.data, 50)
+    check_bands(display, match, "seconds", bunch.data, 50)
 
 
 def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
@@ -242,16 +237,12 @@ def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
     linear, marks = LinearSynchronizer(30).fit(X), {"keyframes": bunch.keyframes}
     by_marks = LinearSynchronizer(30).fit(bunch.data, **marks)
     for display in (
-        SynchronizationDisplay.from_estimator(pipe, X, coverage=None),
         SynchronizationDisplay.from_estimator(linear, X),
         SynchronizationDisplay.from_estimator(by_marks, bunch.data, **marks),
     ):
         assert display.doubtful is display.intervals_ is None
         assert display.axes_[-1].get_title() == "offsets"
         assert not any(is_dotted(display.offsets_))
-    for coverage in (1.0, 90, "most"):
-        with pytest.raises(ValueError, match="coverage must be a probability above 0"):
-            SynchronizationDisplay.from_estimator(linear, X, coverage=coverage)
 
 
 def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch, pipe):
@@ -262,14 +253,8 @@ def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch
     for found, expected in zip(segments(one.intervals_), segments(other.intervals_), strict=True):
         np.testing.assert_array_equal(found, expected)
     assert is_dotted(one.offsets_) == is_dotted(other.offsets_) == match.doubtful.tolist()
-    title = "offsets\nshaded: {} % intervals; dotted: 1 doubtful trial"
-    assert one.axes_[-1].get_title() == other.axes_[-1].get_title() == title.format(90)
-    half = SynchronizationDisplay.from_estimator(match, points, features=0, coverage=0.5)
-    assert half.axes_[-1].get_title() == title.format(50)
-    plain = SynchronizationDisplay.from_estimator(match, points, features=0, coverage=None)
-    assert plain.axes_[-1].get_title() == title.partition("\n")[0]
-    assert plain.intervals_ is None
-    assert not any(is_dotted(plain.offsets_))
+    title = "offsets\nshaded: 90 % intervals; dotted: 1 doubtful trial"
+    assert one.axes_[-1].get_title() == other.axes_[-1].get_title() == title
 
 
 def test_many_bands_are_lighter_than_few(bunch, pipe):
