@@ -263,7 +263,9 @@ def legend_above(top, handles, labels=None, title=None, below=None, n_cols=6):
     """
     if labels is None:
         labels = [handle.get_label() for handle in handles]
-    axis, labels = top[0], [_escape(label) for label in labels]
+    axis, labels = top[0], [label.replace("$", r"\$") for label in labels]
+    # Matplotlib leaves out labels that begin with an underscore.
+    labels = [f" {label}" if label.startswith("_") else label for label in labels]
     extents = [a.get_window_extent() for a in (below or top)]
     room = max(e.x1 for e in extents) - extents[0].x0
     height = axis.figure.bbox.y1 - (extents[0].y0 + extents[0].y1) / 2
@@ -313,12 +315,6 @@ def _legend(axis, handles, labels, title, n_cols, room, size):
         legend.set_title(fill(title, max(int(len(title) * room / box.width), 12)))
         box = legend.get_window_extent()
     return legend, box
-
-
-def _escape(label):
-    """Text that matplotlib neither reads as mathematics nor leaves out of a legend."""
-    label = label.replace("$", r"\$")
-    return f" {label}" if label.startswith("_") else label
 
 
 def parts_outside(ys, lower, upper):

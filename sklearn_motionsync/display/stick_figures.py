@@ -305,11 +305,7 @@ class SkeletonDisplay(MovingDisplay):
         floor = np.zeros(skeleton.n_dims)
         floor[1] = bodies_of(mean)[..., 1].min()
         scenes, titles = [], []
-        listed, last = [frames] if isinstance(frames, Real) else frames, model.n_frames_ - 1
-        if isinstance(listed, (list, tuple, np.ndarray)):
-            listed = [whole(f * last) if isinstance(f, Real) and 0 < f < 1 else f for f in listed]
-        what = "frames, those that are no shares between 0 and 1,"
-        for frame in as_indices(listed, model.n_frames_, what):
+        for frame in _frames_of_model(frames, model.n_frames_):
             samples = model.sample(_N_SAMPLES, frame=frame, random_state=random_state)
             accepted = model.accepts(samples, frame)
             for points in (mean[[frame]], samples[accepted, :width]):
@@ -488,3 +484,13 @@ class SkeletonDisplay(MovingDisplay):
                 x[whole(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
             ]
             panel.show(bodies, [x[whole(at * (len(x) - 1))] for x in behind])
+
+
+def _frames_of_model(frames, n_frames):
+    """Frames by index, or as shares of the action between 0 and 1."""
+    listed = [frames] if isinstance(frames, Real) else frames
+    if isinstance(listed, (list, tuple, np.ndarray)):
+        listed = [
+            whole(f * (n_frames - 1)) if isinstance(f, Real) and 0 < f < 1 else f for f in listed
+        ]
+    return as_indices(listed, n_frames, "frames, those that are no shares between 0 and 1,")

@@ -17,7 +17,6 @@ from ..utils.files import write_whole
 
 __all__ = [
     "Page",
-    "list_of",
     "number",
     "paragraph",
     "picture",
@@ -112,12 +111,6 @@ def paragraph(text, kind=""):
     # No line begins with a unit.
     text = escape(text).replace(" %", "\u00a0%")
     return f"<p{attribute}>{text}</p>" if text else ""
-
-
-def list_of(texts):
-    """A numbered list of lines of code."""
-    items = "".join(f"<li><code>{escape(text)}</code></li>\n" for text in texts)
-    return f"<ol>\n{items}</ol>"
 
 
 def table_of(table, caption, by_row=()):

@@ -6,6 +6,7 @@ import pathlib
 import re
 from collections.abc import Mapping
 from contextlib import contextmanager
+from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,7 +48,7 @@ from ..synchronizers.match import UNITS, Match
 from ..utils.files import check_path
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern
-from .page import Page, list_of, number, paragraph, picture, table_of
+from .page import Page, number, paragraph, picture, table_of
 from .player import add_player_of
 
 __all__ = ["TrialSet", "draw_offsets", "draw_signals", "own_figures", "write_report"]
@@ -203,6 +204,7 @@ def _add_set(page, trials, left_out):
     )
     with config_context(print_changed_only=True):
         steps = [" ".join(repr(step).split()) for step in trials.aligned.reached.steps]
+    listed = "".join(f"<li><code>{escape(_ADDRESS.sub('', step))}</code></li>\n" for step in steps)
     page.add(
         "The set",
         paragraph(f"{text}, on {len(trials.aligned.clock)} frames. {pattern}"),
@@ -210,7 +212,7 @@ def _add_set(page, trials, left_out):
         table_of(omitted, f"Left out before: {counted(len(omitted), 'trial')}"),
         page.offer(left_out=omitted) if len(omitted) else "",
         paragraph("They were aligned by these steps, which show what differs from the defaults:"),
-        list_of(_ADDRESS.sub("", step) for step in steps),
+        f"<ol>\n{listed}</ol>",
     )
 
 
