@@ -263,27 +263,18 @@ class GroupDisplay(Display):
                 f"The comparison is in {comparison.unit}, and the figure in {unit}. Set "
                 f"unit={comparison.unit!r}."
             )
+        caller = f"{cls.__name__}.from_estimator"
         aligned = AlignedCurves.of(
-            estimator,
-            X,
-            params,
-            f"{cls.__name__}.from_estimator",
-            signals=signals,
-            features=features,
-            unit=unit,
+            estimator, X, params, caller, signals=signals, features=features, unit=unit
         )
-        names, note = aligned.names, ""
+        names, notes = aligned.names, []
         chosen = list(range(len(names)))
         if features is None and len(names) > _MOST:
             chosen = choose_features(None, names)
-            note = f"{len(chosen)} of {len(names)} signals"
+            notes.append(f"{len(chosen)} of {len(names)} signals")
         names = [names[i] for i in chosen]
-        if comparison is not None:
-            clusters = comparison.clusters
-            more = clusters[(clusters["what"] == "shape") & ~clusters["feature"].isin(names)]
-            if len(more):
-                note += f"{', ' if note else ''}differences also in "
-                note += ", ".join(dict.fromkeys(more["feature"]))
+        if others := _others_that_differ(comparison, names):
+            notes.append(f"differences also in {', '.join(others)}")
         known_units = dict(zip(aligned.names, aligned.units, strict=True))
         of_people = GroupsOfPeople.of(y, groups, len(aligned.curves))
         # From the mean of all trials.
@@ -298,7 +289,7 @@ class GroupDisplay(Display):
             TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel),
             labels_of_signals(names, known_units, ylabel, units),
             names,
-            f"{title}; {note}" if note else title,
+            "; ".join(filter(None, [title, ", ".join(notes)])),
             _events_on_clock(events, aligned, of_people),
             comparison,
             groups is not None and of_people.are_pairs,
@@ -408,6 +399,14 @@ class GroupDisplay(Display):
             )
             self.clusters_.append(axis.add_collection(lines, autolim=False))
         return [lines for lines in self.clusters_ if len(lines.get_segments())]
+
+
+def _others_that_differ(comparison, names):
+    """The signals of clusters in shape that are not among these; of no comparison none."""
+    if comparison is None:
+        return []
+    features = comparison.clusters.query("what == 'shape'")["feature"]
+    return list(dict.fromkeys(features[~features.isin(names)]))
 
 
 def _curves_of_groups(of_people, shown, offsets, statistic, trials, groups):
