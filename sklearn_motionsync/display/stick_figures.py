@@ -62,7 +62,7 @@ class SkeletonDisplay(MovingDisplay):
 
     A skeleton may lack landmarks. Where a landmark is the mean of joints, limbs are drawn between
     the landmarks; the joints of a skeleton without bones are drawn as points. Positions in a plane
-    are drawn as the camera saw them, whatever the ``azimuth`` of `plot`.
+    are drawn as the camera saw them, whatever the ``azimuth``.
 
     Parameters
     ----------
@@ -129,6 +129,7 @@ class SkeletonDisplay(MovingDisplay):
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
+        azimuth: float = -60,
     ) -> Self:
         """Draw poses of one trial, or of synchronised ones over each other.
 
@@ -143,6 +144,8 @@ class SkeletonDisplay(MovingDisplay):
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
+        azimuth : float, default=-60
+            See `plot`.
 
         Returns
         -------
@@ -156,7 +159,7 @@ class SkeletonDisplay(MovingDisplay):
         shown = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in shown]
         scenes = [[x[[frame]] for x in bodies] for frame in shown]
-        return cls(scenes, skeleton, titles).plot(ax)
+        return cls(scenes, skeleton, titles).plot(ax, azimuth=azimuth)
 
     @classmethod
     def from_trials(
@@ -168,6 +171,7 @@ class SkeletonDisplay(MovingDisplay):
         names: Sequence[str] | None = None,
         ax: AxesLike | None = None,
         at: float = 0.0,
+        azimuth: float = -60,
     ) -> Self:
         """Draw trials side by side, each at its own pace, such as two subjects and a blend.
 
@@ -186,6 +190,8 @@ class SkeletonDisplay(MovingDisplay):
             See `plot`.
         at : float in [0, 1], default=0.0
             See `plot`.
+        azimuth : float, default=-60
+            See `plot`.
 
         Returns
         -------
@@ -202,7 +208,7 @@ class SkeletonDisplay(MovingDisplay):
             titles, recorded = ["as recorded", "aligned"], [float(len(x) - 1) for x in bodies]
             durations = [recorded, [float(np.median(recorded))] * len(bodies)]
         display = cls(scenes, skeleton, titles, durations=durations, labels=labels)
-        return display.plot(ax, at=at)
+        return display.plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
     def from_estimator(
@@ -213,6 +219,7 @@ class SkeletonDisplay(MovingDisplay):
         trials: Sequence[int] | np.ndarray | None = None,
         ax: AxesLike | None = None,
         at: float = 0.0,
+        azimuth: float = -60,
         **params: Any,
     ) -> Self:
         """Draw trials as recorded above the same ones synchronised by a pipeline.
@@ -230,6 +237,8 @@ class SkeletonDisplay(MovingDisplay):
             See `plot`.
         at : float in [0, 1], default=0.0
             The moment that is drawn, as in `plot`.
+        azimuth : float, default=-60
+            The direction of view in degrees, as in `plot`.
         **params : dict
             Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
 
@@ -253,6 +262,7 @@ class SkeletonDisplay(MovingDisplay):
             names=[f"{i} (pattern)" if i == pattern else str(i) for i in trials],
             ax=ax,
             at=at,
+            azimuth=azimuth,
         )
 
     @classmethod
@@ -263,6 +273,7 @@ class SkeletonDisplay(MovingDisplay):
         frames: Sequence[float] | np.ndarray = (0.1, 0.4),
         random_state: RandomState = None,
         ax: AxesLike | None = None,
+        azimuth: float = -60,
     ) -> Self:
         """Draw mean poses of a model, and of twelve random poses those that it accepts (Fig. 4).
 
@@ -276,6 +287,8 @@ class SkeletonDisplay(MovingDisplay):
         random_state : int, RandomState instance or None, default=None
             Determines the random poses; None draws others each time.
         ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -314,7 +327,7 @@ class SkeletonDisplay(MovingDisplay):
                 f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
-        return cls(scenes, skeleton, titles).plot(ax)
+        return cls(scenes, skeleton, titles).plot(ax, azimuth=azimuth)
 
     @classmethod
     def from_departures(
@@ -326,6 +339,7 @@ class SkeletonDisplay(MovingDisplay):
         frames: int | Sequence[int] | np.ndarray = 6,
         reference: TrialsLike | None = None,
         ax: AxesLike | None = None,
+        azimuth: float = -60,
         **params: Any,
     ) -> Self:
         """Draw what is wrong with a trial: when, and with which limbs.
@@ -358,6 +372,8 @@ class SkeletonDisplay(MovingDisplay):
             One to five right trials of the same person, as for `find_departures`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
+        azimuth : float, default=-60
+            The direction of view in degrees, as in `plot`.
         **params : dict
             Further arguments of the synchronizer, such as ``keyframes``.
 
@@ -387,7 +403,7 @@ class SkeletonDisplay(MovingDisplay):
             reference=reference,
         )
         display = cls(scenes, skeleton, titles, marked=marked, behind=behind, heading=heading)
-        return display.plot(ax)
+        return display.plot(ax, azimuth=azimuth)
 
     def plot(
         self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float | None = None

@@ -96,8 +96,7 @@ def test_positions_in_a_plane_are_not_turned():
     seen = BUNCH.data[0].reshape(-1, 15, 3)[..., :2] * [100, -100] + [640, 300]
     X = seen.reshape(len(seen), -1)
     pictures = [
-        SkeletonDisplay.from_positions(X, skeleton, frames=[4]).plot(azimuth=a)
-        for a in (-60, 0, 45)
+        SkeletonDisplay.from_positions(X, skeleton, frames=[4], azimuth=a) for a in (-60, 0, 45)
     ]
     body, floor = seen[4] * [1, -1], -seen[..., 1].max()
     body = body - [body[0, 0], floor]

@@ -218,7 +218,7 @@ def test_animate_refuses_impossible_durations(arguments):
 def test_joints_without_a_skeleton_are_points():
     """They are moved to the floor and not turned."""
     x = POSITIONS[0] + np.tile([5.0, 3.0, -2.0], 15)
-    display = draw_positions(x, None, frames=[4]).plot(azimuth=0)
+    display = draw_positions(x, None, frames=[4], azimuth=0)
     assert all(len(lines.get_paths()) == 0 for lines in display.bones_[0].values())
     points = x.reshape(-1, 15, 3)
     expected = points[4, :, :2] - [points[4, :, 0].mean(), points[..., 1].min()]

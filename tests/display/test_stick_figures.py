@@ -55,7 +55,7 @@ def test_bones_seen_from_the_front_and_from_the_right():
     X = np.tile(body.ravel(), (3, 1))
     joints = dict(zip(skeleton.joints, body, strict=True))
     for azimuth, column in ((0, 0), (-90, 2)):
-        display = SkeletonDisplay.from_positions(X, skeleton, frames=[1]).plot(azimuth=azimuth)
+        display = SkeletonDisplay.from_positions(X, skeleton, frames=[1], azimuth=azimuth)
         expected = np.array(
             [
                 [joints[skeleton.joints[j]][[column, 1]] for j in bone]
@@ -136,7 +136,7 @@ def test_place_heading_and_vertical_axis_have_no_effect():
 
 
 def test_from_model_draws_mean_and_accepted_poses(pipe):
-    display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), random_state=0).plot(azimuth=0)
+    display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), random_state=0, azimuth=0)
     titles = [axis.get_title() for axis in display.axes_]
     assert [title.split("\n")[0] for title in titles] == ["frame 4"] * 2 + ["frame 20"] * 2
     assert [len(bones_drawn(display, panel)) for panel in range(4)] == [14, 12 * 14, 14, 12 * 14]
