@@ -5,6 +5,22 @@ import numpy as np
 from .formats import LANDMARKS, SIDES
 from .limbs import LIMB_NAMES, LIMBS, body_size, landmark_positions, median_lengths, unit_vectors
 
+# Limbs beyond a joint that bends, and the share of a change that is a bend.
+_JOINTED, _MOST = ("left_arm", "right_arm", "left_thigh", "right_thigh"), 0.5
+# Of limbs, the words for a change along the axes of the parent: to the left (of limbs on the right
+# the other way round), up and forward, and the opposite.
+_ON_SIDE, _UPRIGHT = ("to the left", "to the right"), ("raised", "lowered")
+_AHEAD, _TURNED = ("forward", "backward"), ("turned to the right", "turned to the left")
+_OUTWARD, _BENT = ("abducted", "adducted"), ("flexed", "extended")
+_WORDS = {
+    "thigh": (_OUTWARD, _BENT, _BENT),
+    "arm": (("outward", "inward"), _UPRIGHT, _AHEAD),
+    "torso": (_ON_SIDE, _UPRIGHT, _AHEAD),
+    "neck": (_ON_SIDE, _UPRIGHT, _AHEAD),
+    "hip": (_TURNED, ("left side raised", "left side lowered"), _TURNED),
+    "shoulder": (_TURNED, ("left side raised", "left side lowered"), _TURNED),
+}
+
 # -- the vertical axis --------------------------------------------------------------------
 
 # For each vertical axis in space, the axis of the recording that becomes x, y and z, and its sign:
@@ -138,6 +154,40 @@ def convert_to_parent_axes(cosines, limbs, *, inverse=False):
         out[:, i : i + 1] = whole if inverse else local
         axes_of[name] = _swing(limb.rest, local[:, 0]) @ parent
     return out[..., :n_dims]
+
+
+def direction_of(name, change, expected):
+    """The word for where a limb points instead of where it is expected to.
+
+    Parameters
+    ----------
+    name : str
+        Of the limb.
+    change : ndarray, shape (n_dims,)
+        Of its direction, along the axes of the parent limb.
+    expected : ndarray, shape (n_dims,)
+        Its direction, along these axes.
+
+    Returns
+    -------
+    str or None
+        None where a picture does not tell.
+    """
+    limb = LIMBS[name]
+    rest = np.array(limb.rest[: len(change)], dtype=float)
+    pair = unit_vectors(np.stack([expected, expected + change]))
+    if limb.parent in _JOINTED:
+        # Between the limb and its parent: a knee or an elbow.
+        bend = np.diff(np.arccos(np.clip(pair @ rest, -1, 1)))[0]
+        if abs(bend) >= _MOST * np.arccos(np.clip(pair[0] @ pair[1], -1, 1)):
+            return "flexed" if bend > 0 else "extended"
+        return "turned"
+    axis = int(np.argmax(np.abs(change)))
+    if len(change) == 2 and axis == 0:
+        return None
+    words = _WORDS.get(name.removeprefix("left_").removeprefix("right_"))
+    is_mirrored = name.startswith("right_") and axis == 0
+    return words[axis][int(change[axis] < 0) ^ is_mirrored]
 
 
 def _swing(rest, direction):

@@ -210,23 +210,27 @@ class LogPredictionInterval:
         From 0, at least two different ones.
     coverage : float
         Share of new values in the interval.
+    prior_variance : float, default=0.07
+        Of the logarithms; it weighs as much as that of three values.
 
     Attributes
     ----------
     lower, upper : float
+    end : float
+        Half of the interval, in standard deviations of the logarithms.
     deviations : ndarray (n_sequences,)
         Of training values from the mean of the other groups, on the scale of `standardize`.
     """
 
-    def __init__(self, values, groups, coverage):
+    def __init__(self, values, groups, coverage, prior_variance=_PRIOR_VARIANCE):
         logs, n = np.log(values), len(values)
         self._mean = float(logs.mean())
         # The uncertainty of the mean of the others is in the deviations, and in the limit.
         deviations = (logs - mean_of_others(logs, groups)) * np.sqrt((n - 1) / (n + 1))
         squares = np.square(deviations).sum()
-        self._half_width = t_prediction_limit(n, squares, (1 + coverage) / 2)
+        self._half_width = t_prediction_limit(n, squares, (1 + coverage) / 2, prior_variance)
         self._freedom, self._error = n - 1 + _PRIOR_COUNT, np.sqrt(1 + 1 / n)
-        self._end = student.ppf((1 + coverage) / 2, self._freedom) * self._error
+        self.end = student.ppf((1 + coverage) / 2, self._freedom) * self._error
         self.deviations = deviations / self._half_width
         ends = np.exp([self._mean - self._half_width, self._mean + self._half_width])
         self.lower, self.upper = map(float, ends)
@@ -235,9 +239,13 @@ class LogPredictionInterval:
         """Values on the scale on which the interval is -1 to 1."""
         return (np.log(values) - self._mean) / self._half_width
 
+    def ratio(self, deviation):
+        """The ratio of a value on this scale to the geometric mean of the training values."""
+        return np.exp(deviation * self._half_width)
+
     def tails(self, deviations):
         """The logarithm of the probability of deviations on this scale as large to either side."""
-        size = np.abs(self._end * deviations)
+        size = np.abs(self.end * deviations)
         return _log_tail(size / self._error, self._freedom) + np.log(2)
 
 

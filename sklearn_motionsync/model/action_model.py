@@ -27,7 +27,13 @@ from ..utils.groups import encode_groups, group_counts, refuse_classes_as_people
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .acceptance import LEAST, log_moments
-from .similarity import Neighbours, PersonalReference, TrialStream, learn_weights
+from .similarity import (
+    Neighbours,
+    PersonalReference,
+    TrialStream,
+    learn_weights,
+    warn_of_reference,
+)
 from .variation import (
     clock_error,
     mean_band,
@@ -643,6 +649,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         if reference is None:
             return self._neighbours
         of_person = np.stack(self.check_trials(reference)).astype(np.float64)
+        warn_of_reference(self._neighbours.dissimilarity(of_person) > self.threshold_)
         training, stream = self._stream.kept.astype(np.float64), self._stream
         return PersonalReference(training, stream.groups, stream.mean, of_person)
 

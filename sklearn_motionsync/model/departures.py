@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import cached_property, partial
+from functools import cached_property
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 
+from ..body.axes import direction_of
 from ..body.limbs import part_of_limb
 from ..inputs.features import choose_features
 from ..inputs.types import Features, TrialsLike
@@ -20,8 +21,10 @@ from ..matching.warps import at_times
 from ..synchronizers.linear import LinearSynchronizer
 from ..utils.pipelines import find_step, find_synchronizer, flat_steps
 from .action_model import KEPT, ActionModel
+from .detector import ActionDetector, verdict_of
 from .faults import FaultFinder, Part, expected_trial
-from .views import View, limbs_of, models_of_classes, view_of
+from .views import View, limbs_of, view_of
+from .whole_body import WholeBody, WholeFault
 
 __all__ = ["Judged", "find_departures", "judge"]
 
@@ -32,12 +35,11 @@ _OUTSIDE, _HELD = 8, 0.95
 _CORRELATION_TIME = 0.1
 # Frames around a peak belong to it if they deviate by so much of it.
 _OF_PEAK = 0.5
-_COLUMNS = ["trial", "kind", "limb", "region", "feature", "first", "last", "peak"]
-_COLUMNS += ["size", "unit", "deviation", "rare"]
-_DTYPES = {
-    "first": np.intp, "last": np.intp, "peak": np.intp,
-    "size": np.float64, "deviation": np.float64, "rare": bool,
-}  # fmt: skip
+# What a row of the whole body is about. Each of its limits refuses a share of the trials that the
+# model refuses.
+_WHOLE, _N_OF_WHOLE = "whole body", 6
+# At most so many rows of a trial.
+_MOST_ROWS = 5
 
 
 def find_departures(
@@ -52,16 +54,18 @@ def find_departures(
     """What is wrong with trials: the limb, the kind of fault, when, and how large.
 
     A fault changes one limb, or one feature where there are no limbs: by an angle over a window of
-    time, by a lag, or in its amplitude. The most important fault is that with the largest gain in
+    time, by a lag, or in its amplitude; or it is one of the whole body, which starts late, pauses,
+    or moves backwards or too little. The most important fault is that with the largest gain in
     the log likelihood; it is taken away, and the next one is sought, up to five. A limb is judged
     along the axes of its parent limb, so an arm does not depart because the trunk leans. Lags are
     sought before synchronisation, which takes them away.
 
     Parameters
     ----------
-    estimator : ActionModel, ActionClassifier, or Pipeline with one
-        Fitted. With a classifier, the model is that of the class that is predicted before any
-        rejection; these models are fitted by the call (`ActionClassifier.model_of`).
+    estimator : ActionModel, Pipeline with one, or ActionDetector
+        Fitted. With a detector the rows are the reasons for its verdict: a trial that it accepts
+        has none, and one that it refuses has at least one. For the model of a class of a
+        classifier take ``classifier.model_of(label)``.
     X : trials
         As the estimator takes them.
     reference : trials, default=None
@@ -85,15 +89,24 @@ def find_departures(
     DataFrame
         One row a fault, by trial and then the most important first:
 
-        - ``trial``, its number or label, a tuple if an index has several levels; with a
-          classifier ``class``, the predicted one.
+        - ``trial``, its number or label, a tuple if an index has several levels.
         - ``kind``: ``"angle"`` of a limb, ``"value"`` of a feature, ``"late"``, ``"early"``,
-          ``"too small"`` or ``"too large"``, of the amplitude.
+          ``"too small"`` or ``"too large"``, of the amplitude. Of the whole body also ``"starts
+          late"``, ``"starts early"``, ``"stops late"``, ``"stops early"``, ``"pauses"`` and
+          ``"backwards"``; a detector also tells ``"too fast"``, ``"too slow"``, ``"on the other
+          side"``, ``"with the other arm"``, and ``"another movement"`` where nothing else is known.
         - ``limb``, such as ``"left_forearm"``, and ``region``, such as ``"left arm"`` or
-          ``"trunk"``: only where there are limbs; None of other features.
+          ``"trunk"``; ``"whole body"`` in both, which is sought where a synchronizer stands before
+          the model and ``features`` are not given; None of other features.
+        - ``direction``: where the limb points instead, in the axes of its parent: ``"flexed"`` or
+          ``"extended"`` of forearms, legs and thighs, ``"abducted"`` or ``"adducted"``,
+          ``"raised"`` or ``"lowered"``, ``"forward"`` or ``"backward"``, ``"to the left"`` or
+          ``"to the right"``, ``"turned"``; ``"higher"`` or ``"lower"`` of values; else None.
         - ``feature``: the one with the largest deviation.
         - ``first``, ``last`` and ``peak``, the frame of the largest deviation: frames of the
           model, counted from 0. Lags and amplitudes are those of the whole movement.
+        - ``start`` and ``end``, the first and last frame in the recording, counted from 0, and
+          ``start_time`` and ``end_time``, the same in seconds; NaN if the frame rate is not known.
         - ``size`` and ``unit``: the angle in ``"degrees"``; the lag in ``"percent"`` of the clock;
           the ``"ratio"`` of the amplitude to the expected one; the height of the pelvis in
           ``"leg lengths"``; other features differ so much on average, in their own unit, an empty
@@ -104,9 +117,6 @@ def find_departures(
           new people does in no limb and by no kind of fault. It is calibrated by leaving groups
           out of the training set; with a reference, every trial of a person, the others
           being the reference.
-        - ``timing``, whether the clock may be the reason: inside the intervals of 90 % of its times
-          (`Match.interval`) the trial has values within the limit, or
-          ``n_std`` standard deviations. False where no `DenseSynchronizer` tells.
 
     Raises
     ------
@@ -140,60 +150,43 @@ def find_departures(
     is_number = isinstance(limit, Real) and not isinstance(limit, bool)
     if limit is not None and not (is_number and 0 < limit < np.inf):
         raise ValueError(f"limit must be a number above 0, or None; got {limit!r}.")
-    caller = "find_departures"
-    models = models_of_classes(estimator, X, params, caller)
-    table_of = partial(
-        _departures, caller=caller, features=features, limit=limit, reference=reference
-    )
-    if models is None:
-        return table_of(estimator, X, params)
-    # Params are those of the steps before a classifier; its models take none.
-    tables = [table_of(each.estimator, each.trials, {}, part=each) for each in models]
-    order = np.concatenate(
-        [each.indices[t.pop("index")] for each, t in zip(models, tables, strict=True)]
-    )
-    table = pd.concat(tables).iloc[np.argsort(order, kind="stable")]
-    return table.reset_index(drop=True).infer_objects()
-
-
-def _departures(estimator, X, params, caller, features, limit, reference, part=None):
-    """The table of one model; of the model of a class with the class, and indices in it."""
-    judged = judge(estimator, X, params, caller, features=features, reference=reference)
-    view, space = judged.view, judged.space
-    rows = [row for i in range(len(judged.scores)) for row in judged.rows(i, limit)]
-    labels = view.labels if part is None else part.labels
+    judged = judge(estimator, X, params, "find_departures", features=features, reference=reference)
+    space, labels = judged.space, judged.view.labels
+    rows = [row for i in range(len(labels)) for row in judged.rows(i, limit)]
     table = pd.DataFrame(rows, columns=_COLUMNS, dtype=object).astype(_DTYPES)
     # A label may be a tuple, which an array would unpack.
     table["trial"] = pd.Series([labels[row.trial] for row in rows], dtype=object)
-    table["feature"] = pd.Series([space.names[row.feature] for row in rows], dtype=object)
-    if part is not None:
-        table.insert(1, "class", np.full(len(rows), part.label, dtype=object))
-        table.insert(2, "index", np.array([row.trial for row in rows], dtype=np.intp))
-    if space.limbs is None:
-        table = table.drop(columns=["limb", "region"])
-    table["timing"] = np.zeros(len(rows), dtype=bool)
-    if rows and judged.match is not None and judged.match.intervals is not None:
-        reach = (view.model.n_std if limit is None else limit) * judged.std
-        lower, upper = judged.mean - reach, judged.mean + reach
-        table["timing"] = explained_by_timing(rows, judged.curves, lower, upper, judged.match)
+    of_features = [None if row.feature is None else space.names[row.feature] for row in rows]
+    table["feature"] = pd.Series(of_features, dtype=object)
     return table.infer_objects()
 
 
 class Departure(NamedTuple):
-    """A row of the table; ``feature`` is an index."""
+    """A row of the table; ``feature`` is an index, None of the whole body."""
 
     trial: int
     kind: str
     limb: str | None
     region: str | None
-    feature: int
+    direction: str | None
+    feature: int | None
     first: int
     last: int
     peak: int
+    start: int
+    end: int
+    start_time: float
+    end_time: float
     size: float
     unit: str
     deviation: float
     rare: bool
+
+
+_COLUMNS = list(Departure._fields)
+_FRAMES = dict.fromkeys(["first", "last", "peak", "start", "end"], np.intp)
+_NUMBERS = dict.fromkeys(["start_time", "end_time", "size", "deviation"], np.float64)
+_DTYPES = {**_FRAMES, **_NUMBERS, "rare": bool}
 
 
 class Judged(NamedTuple):
@@ -210,11 +203,14 @@ class Judged(NamedTuple):
     scores : ndarray (n, P, n_features)
         Deviations from the mean in standard deviations.
     faults : list of list of FoundFault
+    of_whole : list of list of WholeFault
+        Faults of the whole body, in linear time.
+    refused : ndarray of bool (n,) or None
+        The verdict of a detector; None without one.
     usual_score, rare_score : float
         Scores of faults that are listed, and that nearly all of new people do not exceed.
     far : float
         `ActionModel.simultaneous_factor`.
-    match : Match or None
     """
 
     view: View
@@ -224,29 +220,62 @@ class Judged(NamedTuple):
     std: np.ndarray
     scores: np.ndarray
     faults: list
+    of_whole: list
+    refused: np.ndarray | None
     usual_score: float
     rare_score: float
     far: float
-    match: object
 
     def rows(self, i, limit):
-        """The rows of a trial, the most important first.
+        """The rows of a trial, the most important first: of the whole body, then of its parts.
 
         Those beyond a limit of the deviation. If it is None, those with more evidence than usual,
-        and those that are far away: a body that is wrong altogether has no limb that is.
+        and those that are far away: a body that is wrong altogether has no limb that is. The
+        verdict of a detector decides whether there are any.
         """
-        rows = []
+        is_refused = limit is None and self.refused is not None and bool(self.refused[i])
+        if limit is None and self.refused is not None and not is_refused:
+            return []
+        of_whole = sorted(self.of_whole[i], key=lambda fault: -fault.excess)
+        rows = [
+            self._row_of_whole(i, fault)
+            for fault in of_whole
+            if np.isnan(fault.deviation) or abs(fault.deviation) > (limit or 0)
+        ]
         for fault in self.faults[i]:
             row = self._row(i, fault)
             if row is None or not abs(row.deviation) > (limit or 0):
                 continue
             far = abs(self.scores[i, row.peak, row.feature]) > self.far
-            if limit is None and not (far or fault.score > self.usual_score):
+            is_listed = far or fault.score > self.usual_score or (is_refused and not rows)
+            if limit is None and not is_listed:
                 continue
             same = [r for r in rows if r.feature == row.feature and r.unit == row.unit]
             if not any(r.first <= row.peak <= r.last for r in same):
                 rows.append(row)
-        return rows
+        if is_refused and not rows:
+            another = WholeFault("another movement", 0.0, 1.0, np.nan, "", np.nan, np.nan)
+            rows = [self._row_of_whole(i, another)]
+        return [row._replace(rare=row.rare or is_refused) for row in rows[:_MOST_ROWS]]
+
+    def _row_of_whole(self, i, fault):
+        """The row of a fault of the whole body, whose place is in the time of the recording."""
+        last_frame = self.scores.shape[1] - 1
+        start, stop = fault.start * last_frame, fault.stop * last_frame
+        match = self.view.curves.match
+        frames = np.arange(last_frame + 1)
+        times = frames if match is None else match.times[i]
+        first, last = (whole(x) for x in np.interp([start, stop], times, frames))
+        return Departure(
+            i, fault.kind, _WHOLE, _WHOLE, None, None, first, last, (first + last) // 2,
+            *self._in_recording(i, start, stop), fault.size, fault.unit, fault.deviation, True,
+        )  # fmt: skip
+
+    def _in_recording(self, i, start, stop):
+        """Frames, and seconds, of a recording of times on the clock before it was matched."""
+        facts, last_frame = self.view.curves.facts, self.scores.shape[1] - 1
+        frames = [whole(x / last_frame * (facts.lengths[i] - 1)) for x in (start, stop)]
+        return *frames, *(frame / facts.frame_rates[i] for frame in frames)
 
     def _row(self, i, fault):
         part, last_frame = self.space.parts[fault.part], self.scores.shape[1] - 1
@@ -257,24 +286,29 @@ class Judged(NamedTuple):
             return None
         of, frame = np.unravel_index(first_largest(inside), inside.shape)
         feature, peak = part.features[of], first + int(frame)
-        deviation, kind, size = fault.deviation, fault.kind, fault.size
+        deviation, kind, size, direction = fault.deviation, fault.kind, fault.size, None
         is_limb = part.region is not None and len(part.columns) > 1
         if kind == "off":
             deviation, kind = float(self.scores[i, peak, feature]), "angle" if is_limb else "value"
             if is_limb:
+                direction = self.space.direction(part, size, self.mean[peak])
                 chord = np.linalg.norm(size)
                 size, unit = float(np.degrees(2 * np.arcsin(min(chord / 2, 1)))), "degrees"
             else:
                 first, last = around_peak(self.scores[i, :, feature], peak)
                 off = (self.curves[i] - self.mean)[first : last + 1, feature]
                 size, unit = float(np.nanmean(off)), "leg lengths" if part.region else ""
+                direction = "higher" if size > 0 else "lower"
         elif kind in ("late", "early"):
             size, unit = 100 * abs(size) / last_frame, "percent"
         else:
             unit = "ratio"
+        match = self.view.curves.match
+        times = np.arange(last_frame + 1) if match is None else match.times[i]
         limb = None if part.region is None else part.name
         return Departure(
-            i, kind, limb, part.region, feature, first, last, peak, size, unit, deviation,
+            i, kind, limb, part.region, direction, feature, first, last, peak,
+            *self._in_recording(i, times[first], times[last]), size, unit, deviation,
             fault.score > self.rare_score,
         )  # fmt: skip
 
@@ -302,22 +336,43 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     view = expected.view.of(X, params, caller)
     n, match = len(view.labels), view.curves.match
     sought = range(n) if only is None else [only(n)]
-    mean, std, of_person, in_time = expected.mean, expected.std, None, None
+    mean, std, of_person, of_person_in_time = expected.mean, expected.std, None, None
     if reference is not None:
         theirs = expected.view.of(reference, {}, caller)
         of_person = expected.filled(theirs.whole)
-        in_time = expected.in_linear_time(of_person, theirs.curves.match)
+        of_person_in_time = expected.in_linear_time(of_person, theirs.curves.match)
         mean, variance = expected_trial(expected.training, view.model.groups_, of_person)
         std = np.sqrt(variance + expected.left_out * (1 + 1 / len(of_person)))
-    finder = expected.finder(of_person, in_time)
+    finder = expected.finder(of_person, of_person_in_time)
     curves, filled = view.whole[..., expected.chosen], expected.filled(view.whole)
-    later = expected.in_linear_time(filled, match)
-    later = [None] * n if later is None else later
-    pairs = enumerate(zip(expected.space.convert(filled), later, strict=True))
-    faults = [finder.find(x, in_time) if i in sought else [] for i, (x, in_time) in pairs]
-    scores = (curves - mean) / std
-    usual, rare, far = finder.usual_score, finder.rare_score, expected.far
-    return Judged(view, expected.space, curves, mean, std, scores, faults, usual, rare, far, match)
+    converted, later = expected.space.convert(filled), expected.in_linear_time(filled, match)
+    in_time = converted if later is None else later
+    faults = [[] for _ in range(n)]
+    for i in sought:
+        faults[i] = finder.find(converted[i], None if later is None else later[i])
+    of_whole = [[] for _ in range(n)]
+    if expected.whole_body is not None:
+        pairs = zip(in_time, converted[..., : in_time.shape[2]], strict=True)
+        of_whole = [expected.whole_body.find(*pair) for pair in pairs]
+    refused, detector = None, getattr(estimator, "best_estimator_", estimator)
+    if isinstance(detector, ActionDetector):
+        known = view.curves.known
+        refused, of_detector = verdict_of(detector, X, reference, params, caller, known)
+        of_whole = [a + b for a, b in zip(of_whole, of_detector, strict=True)]
+    return Judged(
+        view=view,
+        space=expected.space,
+        curves=curves,
+        mean=mean,
+        std=std,
+        scores=(curves - mean) / std,
+        faults=faults,
+        of_whole=of_whole,
+        refused=refused,
+        usual_score=finder.usual_score,
+        rare_score=finder.rare_score,
+        far=expected.far,
+    )
 
 
 class _Expected:
@@ -364,6 +419,18 @@ class _Expected:
                 whose = np.arange(len(examples))
             examples = with_residuals(padded[..., chosen], whose, self.left_out)
             self._linear = self._known_in_time(examples), whose
+        # Only what has a time of its own, and a body, starts late or pauses.
+        self._has_body = features is None and synchronizer is not None
+
+    @cached_property
+    def whole_body(self):
+        """What whole trials do in linear time; None where that is not known."""
+        if not self._has_body:
+            return None
+        coverage = 1 - (1 - self.view.model.coverage) / _N_OF_WHOLE
+        on_clock, groups = self.space.convert(self.training), self.view.model.groups_
+        in_time = (on_clock, groups) if self._linear is None else self._linear
+        return WholeBody(*in_time, on_clock[..., : in_time[0].shape[2]], groups, coverage)
 
     @cached_property
     def far(self):
@@ -442,6 +509,11 @@ class FaultSpace:
         self._others, n_cosines = remaining, len(names) - len(remaining)
         self.parts += [Part(names[k], [n_cosines + j], [k], None) for j, k in enumerate(remaining)]
 
+    def direction(self, part, change, mean):
+        """Where a limb departs to by a change of its cosines, by the mean (n_features,) there."""
+        expected = self.convert(mean[np.newaxis, np.newaxis])[0, 0, part.columns]
+        return direction_of(part.name, change, expected)
+
     def convert(self, trials):
         """Trials (n, P, n_features) of the view, without gaps: (n, P, n_columns)."""
         if self.limbs is None:
@@ -516,35 +588,3 @@ def _is_linear(synchronizer):
     """Whether a synchronizer leaves time as it is."""
     synchronizer = getattr(synchronizer, "synchronizer_", synchronizer)
     return isinstance(synchronizer, LinearSynchronizer) and synchronizer.keyframes_ is None
-
-
-def explained_by_timing(rows, curves, lower, upper, match):
-    """Whether a wrong clock may be the reason of departures, (n_rows,).
-
-    The time of every frame of one may then be another one inside its interval, where the
-    trial has values between the bounds.
-
-    Parameters
-    ----------
-    rows : list of Departure
-    curves : ndarray, shape (n, P, n_features)
-        Trials on the clock.
-    lower, upper : ndarray, shape (P, n_features)
-        Bounds of what is no departure.
-    match : Match
-        Of the trials.
-    """
-    n_frames, pairs = curves.shape[1], zip(match.times, *match.interval(), strict=True)
-    # The frames of the clock whose times are inside the interval of a frame.
-    spans = np.array([(t.searchsorted(a), t.searchsorted(b, "right")) for t, a, b in pairs])
-    frames, explained = np.arange(n_frames), np.empty(len(rows), dtype=bool)
-    starts, ends = np.minimum(spans[:, 0], frames), np.maximum(spans[:, 1], frames + 1)
-    for k, row in enumerate(rows):
-        i, feature = row.trial, row.feature
-        curve, run = curves[i, :, feature], frames[row.first : row.last + 1]
-        # A fault may last over a gap, in which nothing was seen.
-        run = run[~np.isnan(curve[run])]
-        seen = [curve[starts[i, p] : ends[i, p]] for p in run]
-        low, high = (np.array([extreme(x) for x in seen]) for extreme in (np.nanmin, np.nanmax))
-        explained[k] = np.all((low <= upper[run, feature]) & (high >= lower[run, feature]))
-    return explained

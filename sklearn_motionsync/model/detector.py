@@ -33,10 +33,11 @@ from ..utils.pipelines import (
 )
 from .acceptance import Acceptance, Contrast, LogPredictionInterval, dissimilarity_tails
 from .action_model import ActionModel
-from .similarity import PersonalReference, TrialStream, movement_energies
+from .similarity import PersonalReference, TrialStream, movement_energies, warn_of_reference
 from .views import curves_of
+from .whole_body import WholeFault
 
-__all__ = ["ActionDetector"]
+__all__ = ["ActionDetector", "verdict_of"]
 
 # Reasons for the rejection of a trial below, or above, the accepted interval.
 _REASONS = {
@@ -50,6 +51,12 @@ _REASONS = {
     "reversal": (None, "the other way"),
 }
 _TWO_SIDED = "duration", "energy"
+# The same as kinds of departures of the whole body.
+_WHOLE_KINDS = {
+    "duration": ("too fast", "too slow"),
+    "mirror": (None, "on the other side"),
+    "arms": (None, "with the other arm"),
+}
 # A statistic beyond so many times its limit is a rejection, whatever the others are.
 _ALONE = 1.5
 
@@ -110,7 +117,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
     See Also
     --------
     ActionModel : Makes the first test only.
-    find_departures : When, and with which limb, a trial departs.
+    find_departures : The reasons for a rejection: which limb, when, and how far.
 
     Notes
     -----
@@ -255,7 +262,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             As the pipeline takes them.
         reference : trials, as the pipeline takes them, default=None
             Good ones of the person that X is of, two to five. It needs training groups with several
-            trials.
+            trials. If the detector refuses most of them, a `SynchronizationWarning` says so.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
@@ -264,7 +271,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray of int, shape (n_sequences,)
             1 if the score is below its limit, and all contrasts are above theirs; else -1.
         """
-        scores = self._test(X, reference, params, "predict")[0]
+        scores = self._test(X, reference, params, "ActionDetector.predict")[0]
         return np.where(scores <= 1, 1, -1)
 
     def decision_function(
@@ -286,7 +293,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray, shape (n_sequences,)
             ``score_samples`` less ``offset_``: negative for trials that are rejected.
         """
-        return 1 - self._test(X, reference, params, "decision_function")[0]
+        return 1 - self._test(X, reference, params, "ActionDetector.decision_function")[0]
 
     def score_samples(
         self, X: TrialsLike, reference: TrialsLike | None = None, **params: Any
@@ -307,7 +314,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray, shape (n_sequences,)
             At least ``offset_`` for trials that are accepted.
         """
-        return -self._test(X, reference, params, "score_samples")[0]
+        return -self._test(X, reference, params, "ActionDetector.score_samples")[0]
 
     def report(
         self, X: TrialsLike, reference: TrialsLike | None = None, **params: Any
@@ -332,7 +339,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             those that are too short or too weak. ``score``: up to 1 is accepted. ``reason`` of a
             rejection, such as "too long, too weak"; empty if the trial is accepted.
         """
-        scores, facts, statistics, tails, acceptance = self._test(X, reference, params, "report")
+        scores, facts, statistics, tails, acceptance = self._test(X, reference, params, "ActionDetector.report")
         table = pd.DataFrame(statistics, index=facts.index)
         table["score"] = scores
         # What no test alone explains is that which adds most to the score.
@@ -427,17 +434,21 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             if c.is_clear or (name in always and c.middle > 0)
         }
 
-    def _test(self, X, reference, params, method):
-        """Scores of trials, their facts, and what their reasons are found in."""
+    def _test(self, X, reference, params, caller, known=None):
+        """Scores of trials, their facts, and what their reasons are found in.
+
+        ``known`` are matches of X that were made before, as `curves_of` takes them.
+        """
         check_is_fitted(self)
-        tests, caller = self._tests, f"ActionDetector.{method}"
+        tests = self._tests
         try:
-            curves = curves_of(self.estimator_, X, params, caller)
+            curves = curves_of(self.estimator_, X, params, caller, known)
             whole, reached = curves.whole[..., tests.columns], curves.match.reached
             of_person = None
             if reference is not None:
-                of_person = curves_of(self.estimator_, reference, {}, caller).whole
-                of_person = fill_with_mean(of_person[..., tests.columns], tests.aligned.mean_)
+                theirs = curves_of(self.estimator_, reference, {}, caller)
+                warn_of_reference(self._test(reference, None, {}, caller, theirs.known)[0] > 1)
+                of_person = fill_with_mean(theirs.whole[..., tests.columns], tests.aligned.mean_)
         except MissingMetadata as error:
             reason, name, _ = error.args
             raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error
@@ -486,6 +497,38 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             far = np.maximum(far, statistics[name])
         scores = np.where(far > 1, np.maximum(scores, far), scores)
         return scores, curves.facts, statistics, tails, acceptance
+
+
+def verdict_of(detector, X, reference, params, caller, known):
+    """Whether a detector refuses trials, and what it alone tells of each as a whole.
+
+    Parameters
+    ----------
+    detector : ActionDetector
+        Fitted.
+    X, reference, params
+        As for ``predict``.
+    caller, known
+        As for `curves_of`.
+
+    Returns
+    -------
+    refused : ndarray of bool, shape (n_sequences,)
+    faults : list of list of WholeFault
+    """
+    scores, _, statistics, _, _ = detector._test(X, reference, params, caller, known)
+    faults = [[] for _ in scores]
+    for name, kinds in _WHOLE_KINDS.items():
+        for i, value in enumerate(statistics.get(name, ())):
+            kind, size, unit, deviation = kinds[int(value > 0)], np.nan, "", np.nan
+            if abs(value) <= 1 or kind is None:
+                continue
+            if name == "duration":
+                interval = detector._tests.intervals[name]
+                size, unit = float(interval.ratio(value)), "ratio"
+                deviation = float(value * interval.end)
+            faults[i].append(WholeFault(kind, 0.0, 1.0, size, unit, abs(value), deviation))
+    return scores > 1, faults
 
 
 def _check_steps(pipeline):

@@ -1,5 +1,6 @@
 """Dissimilarity of trials to training trials, and which of these are kept."""
 
+import warnings
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ import numpy as np
 from ..matching.filters import smooth
 from ..matching.gaps import fill_with_mean, is_gappy
 from ..matching.warps import even_slices
+from ..synchronizers.learning import SynchronizationWarning
 from ..utils.groups import encode_groups, mean_of_others, sums_of_groups
 from ..utils.parallel import one_blas_thread
 from .acceptance import DISSIMILARITY_VARIANCE, LEAST, LogMoments, log_moments
@@ -21,6 +23,7 @@ __all__ = [
     "distances_by_differences",
     "learn_weights",
     "movement_energies",
+    "warn_of_reference",
 ]
 
 # A dissimilarity is the mean over so many nearest neighbours: a single one may be an outlier.
@@ -355,6 +358,19 @@ class PersonalReference:
         moved = reference + (ratio - 1) * (reference.mean(axis=0) - mean)
         one = np.zeros(len(reference), dtype=np.intp)
         return Neighbours(moved, one, mean=self._mean, weights=self._weights)
+
+
+def warn_of_reference(is_refused):
+    """Warn if most trials of a person's reference (n,) are no right ones themselves."""
+    if is_refused.mean() > 0.5:
+        refused = ", ".join(map(str, np.flatnonzero(is_refused)))
+        warnings.warn(
+            f"{is_refused.sum()} of the {len(is_refused)} trials of the reference are themselves "
+            f"refused when they are judged without one (numbers {refused}). What is like them is "
+            "accepted: give right trials of the person, or no reference.",
+            SynchronizationWarning,
+            stacklevel=3,
+        )
 
 
 def _sums_over(weights, a, b):

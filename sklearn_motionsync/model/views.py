@@ -1,4 +1,4 @@
-"""The models inside fitted estimators: in chosen features, in limbs, and of each class."""
+"""The models inside fitted estimators: in chosen features, and in limbs."""
 
 from types import MappingProxyType
 from typing import NamedTuple
@@ -15,31 +15,26 @@ from ..inputs.collections import Trials, as_collection
 from ..inputs.features import as_features, names_of_features
 from ..inputs.trial_facts import TrialFacts
 from ..inputs.validation import check_input
-from ..matching.counting import first_largest
 from ..synchronizers.match import Match
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
     Routed,
     accepted_params,
     explain_missing,
-    find_classifier,
     find_step,
     find_synchronizer,
     flat_steps,
     refuse_params,
-    transform_through,
     union_transformers,
 )
 from .action_model import ActionModel
 
 __all__ = [
-    "ClassModel",
     "Curves",
     "LimbColumns",
     "View",
     "curves_of",
     "limbs_of",
-    "models_of_classes",
     "view_of",
 ]
 
@@ -64,6 +59,8 @@ class Curves(NamedTuple):
         Of the trials as they were recorded.
     route : _Route
         The steps to the model.
+    known : dict
+        The match of each synchronizer, as `matches_of_a_fit` gives it.
     """
 
     whole: np.ndarray
@@ -71,6 +68,7 @@ class Curves(NamedTuple):
     match: Match | None
     facts: TrialFacts
     route: object
+    known: dict
 
     @property
     def names(self):
@@ -91,7 +89,7 @@ def curves_of(estimator, X, params, caller, known=None):
     caller : str
         The public function that the user called with (estimator, X), for messages.
     known : dict, default=None
-        As `matches_of_a_fit` gives it, if X are the trials of the fit.
+        As `matches_of_a_fit` gives it, if X were matched before.
 
     Returns
     -------
@@ -288,7 +286,7 @@ class _Route(NamedTuple):
         methods = [(step, name) for step in steps for name in ("match", "transform")]
         takers = [getattr(step, name) for step, name in methods if hasattr(step, name)]
         refuse_params(takers, params, caller)
-        points, whole, matches = X, None, []
+        points, whole, matches, known = X, None, [], dict(known)
         with explain_missing(caller):
             for step in self.before:
                 points = _through(step, points, params, matches, X, known)
@@ -304,10 +302,10 @@ class _Route(NamedTuple):
         rate = params.get("frame_rate")
         facts = TrialFacts.of(X, rate, checked=checked) if match is None else match.facts
         if whole is None:
-            return Curves(np.stack(checked), checked, match, facts, self)
+            return Curves(np.stack(checked), checked, match, facts, self, known)
         beside = np.stack(as_collection(points))[:, :, len(self.aspace.components_) :]
         whole = np.concatenate([np.stack(whole), beside], axis=2)
-        return Curves(whole, checked, match, facts, self)
+        return Curves(whole, checked, match, facts, self, known)
 
 
 def _names(steps, estimator, n_features):
@@ -318,7 +316,7 @@ def _names(steps, estimator, n_features):
 def _through(step, points, params, matches, X, known):
     """Trials X after a step; if it matches them, it warps them by this match, which is appended.
 
-    One that matched them in its fit is known.
+    What is matched here is known from then on.
     """
     if not hasattr(step, "match"):
         return step.transform(points, **accepted_params(step.transform, params))
@@ -329,6 +327,7 @@ def _through(step, points, params, matches, X, known):
     _, match = known.get(id(synchronizer), (None, None))
     if match is None:
         match = synchronizer.match(facts.label(trials), **accepted)
+        known[id(synchronizer)] = synchronizer, match
     # What is hidden by a confidence is hidden in the trials of the match.
     seen = trials if match.reached is None else match.reached.trials
     reached = Routed(None, synchronizer, seen, accepted, facts)
@@ -435,71 +434,3 @@ def _columns_of(cosines, names):
         if names[k : k + len(cosine_names)] == [f"{prefix}{x}" for x in cosine_names]:
             return slice(k, k + len(cosine_names))
     return None
-
-
-# -- the models of a classifier ------------------------------------------------------------
-
-
-class ClassModel(NamedTuple):
-    """The model of a class, and the trials that are predicted to be of this class.
-
-    Attributes
-    ----------
-    label : label of the class
-    estimator : Pipeline
-        Fitted: the steps before the classifier, and those of ``model_of(label)``.
-    trials : trials, as the estimator takes them
-    indices : ndarray of int
-        Their indices among all.
-    labels : list
-        Their labels.
-    """
-
-    label: object
-    estimator: Pipeline
-    trials: object
-    indices: np.ndarray
-    labels: list
-
-
-def models_of_classes(estimator, X, params, caller, only=None):
-    """The models of the classes that a classifier predicts, before any rejection.
-
-    Parameters
-    ----------
-    estimator : estimator or Pipeline
-        Fitted.
-    X : trials, as the estimator takes them
-    params : dict
-        What the steps before the classifier take besides.
-    caller : str
-        The public function that the user called with (estimator, X), for messages.
-    only : callable, default=None
-        Gives the index of a single trial, of their number; by default all.
-
-    Returns
-    -------
-    list of ClassModel, or None
-        None if there is no classifier that has models.
-    """
-    located = find_classifier(estimator)
-    if located is None:
-        return None
-    before, classifier = located
-    features = transform_through(before, X, params, caller)
-    trials = classifier.check_trials(features)
-    chosen = np.arange(len(trials))
-    if only is not None:
-        chosen = chosen[[only(len(trials))]]
-    columns = first_largest(classifier.predict_proba(trials.take(chosen)), axis=1)
-    collection, all_labels = as_collection(X), TrialFacts.of(X, checked=trials).labels
-    steps, models = [] if before is None else before.steps, []
-    for column in dict.fromkeys(columns.tolist()):
-        indices, label = chosen[columns == column], classifier.classes_[column]
-        if collection is not None:
-            members = [collection[i] for i in indices]
-        else:
-            members = X.iloc[indices] if hasattr(X, "iloc") else np.asarray(X)[indices]
-        pipe = Pipeline([*steps, *classifier.model_of(label).steps])
-        models.append(ClassModel(label, pipe, members, indices, [all_labels[i] for i in indices]))
-    return models
