@@ -265,6 +265,7 @@ def judged(name, fault, limb, start, stop, told, is_rare):
     """What is said of a trial, beside the truth."""
     regions = {limb: region for limb, (*_, region) in LIMBS.items()}
     regions |= dict.fromkeys(("hip", "shoulder", "neck", "pelvis_height"), "trunk")
+    regions["whole body"] = "whole body"
     is_region = regions[limb] == regions[fault.limb]
     overlap = np.nan
     if fault.kind == "angle" and is_region:

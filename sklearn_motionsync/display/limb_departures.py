@@ -10,8 +10,7 @@ from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import LIMBS
 from ..inputs.tables import name_trial
-from ..model.departures import judge
-from ..model.views import models_of_classes
+from ..model.departures import WHOLE, judge
 from ..utils.pipelines import find_step, find_synchronizer, flat_steps, union_transformers
 from .arguments import as_frames, as_index
 
@@ -51,7 +50,7 @@ def limb_departures(rows, n_frames, frames, skeleton):
     marked : list of list of (int, int)
         The bones that depart around each frame.
     """
-    rows = [row for row in rows if row.limb is not None]
+    rows = [row for row in rows if row.limb not in (None, WHOLE)]
     shown, stretches = _stretches(rows, frames, n_frames)
     titles, marked = [], []
     for frame, stretch in zip(shown, stretches, strict=True):
@@ -74,10 +73,12 @@ def limb_departures(rows, n_frames, frames, skeleton):
 
 
 def describe_departure(row):
-    """A departure in plain words, such as ``"left forearm 31\N{DEGREE SIGN} off"``."""
+    """A departure in plain words, such as ``"left forearm 31\N{DEGREE SIGN} flexed"``."""
     limb = row.limb.replace("_", " ")
+    if limb == WHOLE:
+        return f"{limb} {row.kind}"
     if row.kind == "angle":
-        return f"{limb} {row.size:.0f}\N{DEGREE SIGN} off"
+        return f"{limb} {row.size:.0f}\N{DEGREE SIGN} {row.direction or 'off'}"
     if row.kind in ("late", "early"):
         return f"{limb} {row.size:.0f} % {row.kind}"
     if row.unit == "ratio":
@@ -128,13 +129,8 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
     if X is None:
         raise ValueError(f"{caller} needs trials X, whose departures are drawn; got None.")
     index = partial(as_index, trial, what="trial")
-    models = models_of_classes(estimator, X, params, caller, index)
-    if models is not None:
-        (model,) = models
-        estimator, X, params = model.estimator, model.trials, {}
     before, _ = split_at_synchronizer(estimator)
-    chosen = index if models is None else None
-    judged = judge(estimator, X, params, caller, reference=reference, only=chosen)
+    judged = judge(estimator, X, params, caller, reference=reference, only=index)
     view, limbs = judged.view, judged.space.limbs
     if limbs is None:
         raise ValueError(
@@ -143,15 +139,12 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
             f"are {', '.join(view.names[:4])}, ..., by way of "
             f"{[type(step).__name__ for step in flat_steps(before)]}."
         )
-    if models is None:
-        i, note = index(len(view.labels)), ""
-        name = name_trial(i, view.labels[i])
-    else:
-        i, note = 0, " by the model of that class"
-        name = name_trial(int(model.indices[0]), model.labels[0])
-        name = f"{name}, most like {str(model.label)!r},"
+    i = index(len(view.labels))
     rows, skeleton = judged.rows(i, None), limbs.cosines.skeleton.body()
-    is_accepted = view.model_of_points.predict(view.curves.points.take([i]))[0] == 1
+    if judged.refused is None:
+        is_accepted = view.model_of_points.predict(view.curves.points.take([i]))[0] == 1
+    else:
+        is_accepted = not judged.refused[i]
     # Hints would hide what is rare, and most right trials have some.
     rows = [row for row in rows if row.rare] or ([] if is_accepted else rows)
     shown, titles, marked = limb_departures(rows, len(judged.mean), frames, skeleton)
@@ -169,7 +162,7 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
     whose = "a new person" if reference is None else "this person"
     rare = [describe_departure(row) for row in rows if row.rare and row.limb is not None]
     heading = (
-        f"{name} is {verdict}{note}.\n"
+        f"{name_trial(i, view.labels[i])} is {verdict}.\n"
         f"Rare: {', '.join(rare) if rare else 'nothing'}. Violet: limbs that depart at or around "
         f"that frame. Pale: what is expected of {whose}."
     )

@@ -355,10 +355,10 @@ class SkeletonDisplay(MovingDisplay):
 
         Parameters
         ----------
-        estimator : Pipeline
-            Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without; or to
-            an `ActionClassifier`, whose model of the predicted class is used. The cosines may be
-            one part of a union, whose other features count for the decision and are not drawn.
+        estimator : Pipeline or ActionDetector
+            Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without. The
+            cosines may be one part of a union, whose other features count for the decision and are
+            not drawn.
         X : list of arrays (n_frames_i, n_dims * n_joints)
             Joint positions.
         trial : int, default=0

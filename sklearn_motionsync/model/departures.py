@@ -19,14 +19,14 @@ from ..matching.counting import ROUNDING, first_largest, whole
 from ..matching.gaps import fill_with_mean
 from ..matching.warps import at_times
 from ..synchronizers.linear import LinearSynchronizer
-from ..utils.pipelines import find_step, find_synchronizer, flat_steps
+from ..utils.pipelines import find_step, find_synchronizer, flat_steps, matches_of_a_fit
 from .action_model import KEPT, ActionModel
-from .detector import ActionDetector, verdict_of
+from .detector import ActionDetector
 from .faults import FaultFinder, Part, expected_trial
 from .views import View, limbs_of, view_of
 from .whole_body import WholeBody, WholeFault
 
-__all__ = ["Judged", "find_departures", "judge"]
+__all__ = ["WHOLE", "Judged", "find_departures", "judge"]
 
 # A floor of the variance of limbs, in units of that outside of the components that hold so much.
 # Chosen on HDM05 and two exercises of UI-PRMD.
@@ -37,7 +37,13 @@ _CORRELATION_TIME = 0.1
 _OF_PEAK = 0.5
 # What a row of the whole body is about. Each of its limits refuses a share of the trials that the
 # model refuses.
-_WHOLE, _N_OF_WHOLE = "whole body", 6
+WHOLE, _N_OF_WHOLE = "whole body", 6
+# Tests of a detector that are kinds of departures of the whole body, below and above their limits.
+_OF_DETECTOR = {
+    "duration": ("too fast", "too slow"),
+    "mirror": (None, "on the other side"),
+    "arms": (None, "with the other arm"),
+}
 # At most so many rows of a trial.
 _MOST_ROWS = 5
 
@@ -117,6 +123,10 @@ def find_departures(
           new people does in no limb and by no kind of fault. It is calibrated by leaving groups
           out of the training set; with a reference, every trial of a person, the others
           being the reference.
+        - ``timing``, whether the clock may be the reason: inside the intervals of 90 % of its times
+          (`Match.interval`) the trial has values within the limit, or
+          ``n_std`` standard deviations. False of the whole body, and where no `DenseSynchronizer`
+          tells.
 
     Raises
     ------
@@ -158,6 +168,16 @@ def find_departures(
     table["trial"] = pd.Series([labels[row.trial] for row in rows], dtype=object)
     of_features = [None if row.feature is None else space.names[row.feature] for row in rows]
     table["feature"] = pd.Series(of_features, dtype=object)
+    table["timing"] = np.zeros(len(rows), dtype=bool)
+    match = judged.view.curves.match
+    of_parts = [k for k, row in enumerate(rows) if row.feature is not None]
+    if of_parts and match is not None and match.intervals is not None:
+        reach = (judged.view.model.n_std if limit is None else limit) * judged.std
+        lower, upper = judged.mean - reach, judged.mean + reach
+        rows_of_parts = [rows[k] for k in of_parts]
+        table.loc[of_parts, "timing"] = explained_by_timing(
+            rows_of_parts, judged.curves, lower, upper, match
+        )
     return table.infer_objects()
 
 
@@ -183,7 +203,7 @@ class Departure(NamedTuple):
     rare: bool
 
 
-_COLUMNS = list(Departure._fields)
+_COLUMNS = list(Departure.__annotations__)
 _FRAMES = dict.fromkeys(["first", "last", "peak", "start", "end"], np.intp)
 _NUMBERS = dict.fromkeys(["start_time", "end_time", "size", "deviation"], np.float64)
 _DTYPES = {**_FRAMES, **_NUMBERS, "rare": bool}
@@ -267,7 +287,7 @@ class Judged(NamedTuple):
         times = frames if match is None else match.times[i]
         first, last = (whole(x) for x in np.interp([start, stop], times, frames))
         return Departure(
-            i, fault.kind, _WHOLE, _WHOLE, None, None, first, last, (first + last) // 2,
+            i, fault.kind, WHOLE, WHOLE, None, None, first, last, (first + last) // 2,
             *self._in_recording(i, start, stop), fault.size, fault.unit, fault.deviation, True,
         )  # fmt: skip
 
@@ -356,8 +376,9 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
         of_whole = [expected.whole_body.find(*pair) for pair in pairs]
     refused, detector = None, getattr(estimator, "best_estimator_", estimator)
     if isinstance(detector, ActionDetector):
-        known = view.curves.known
-        refused, of_detector = verdict_of(detector, X, reference, params, caller, known)
+        with matches_of_a_fit(view.curves.known):
+            report = detector.report(X, reference, **params)
+        refused, of_detector = report["score"].to_numpy() > 1, _of_detector(detector, report)
         of_whole = [a + b for a, b in zip(of_whole, of_detector, strict=True)]
     return Judged(
         view=view,
@@ -373,6 +394,22 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
         rare_score=finder.rare_score,
         far=expected.far,
     )
+
+
+def _of_detector(detector, report):
+    """What a detector alone tells of whole trials, a list of WholeFault each, by its report."""
+    faults = [[] for _ in range(len(report))]
+    for name, kinds in _OF_DETECTOR.items():
+        for i, value in enumerate(report.get(name, ())):
+            kind = kinds[int(value > 0)]
+            if abs(value) <= 1 or kind is None:
+                continue
+            size, unit = np.nan, ""
+            if name == "duration":
+                lower, upper = detector.borders_[name]
+                size, unit = float((upper / lower) ** (value / 2)), "ratio"
+            faults[i].append(WholeFault(kind, 0.0, 1.0, size, unit, abs(value), np.nan))
+    return faults
 
 
 class _Expected:
@@ -588,3 +625,35 @@ def _is_linear(synchronizer):
     """Whether a synchronizer leaves time as it is."""
     synchronizer = getattr(synchronizer, "synchronizer_", synchronizer)
     return isinstance(synchronizer, LinearSynchronizer) and synchronizer.keyframes_ is None
+
+
+def explained_by_timing(rows, curves, lower, upper, match):
+    """Whether a wrong clock may be the reason of departures, (n_rows,).
+
+    The time of every frame of one may then be another one inside its interval, where the
+    trial has values between the bounds.
+
+    Parameters
+    ----------
+    rows : list of Departure
+    curves : ndarray, shape (n, P, n_features)
+        Trials on the clock.
+    lower, upper : ndarray, shape (P, n_features)
+        Bounds of what is no departure.
+    match : Match
+        Of the trials.
+    """
+    n_frames, pairs = curves.shape[1], zip(match.times, *match.interval(), strict=True)
+    # The frames of the clock whose times are inside the interval of a frame.
+    spans = np.array([(t.searchsorted(a), t.searchsorted(b, "right")) for t, a, b in pairs])
+    frames, explained = np.arange(n_frames), np.empty(len(rows), dtype=bool)
+    starts, ends = np.minimum(spans[:, 0], frames), np.maximum(spans[:, 1], frames + 1)
+    for k, row in enumerate(rows):
+        i, feature = row.trial, row.feature
+        curve, run = curves[i, :, feature], frames[row.first : row.last + 1]
+        # A fault may last over a gap, in which nothing was seen.
+        run = run[~np.isnan(curve[run])]
+        seen = [curve[starts[i, p] : ends[i, p]] for p in run]
+        low, high = (np.array([extreme(x) for x in seen]) for extreme in (np.nanmin, np.nanmax))
+        explained[k] = np.all((low <= upper[run, feature]) & (high >= lower[run, feature]))
+    return explained

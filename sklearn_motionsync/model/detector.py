@@ -35,9 +35,8 @@ from .acceptance import Acceptance, Contrast, LogPredictionInterval, dissimilari
 from .action_model import ActionModel
 from .similarity import PersonalReference, TrialStream, movement_energies, warn_of_reference
 from .views import curves_of
-from .whole_body import WholeFault
 
-__all__ = ["ActionDetector", "verdict_of"]
+__all__ = ["ActionDetector"]
 
 # Reasons for the rejection of a trial below, or above, the accepted interval.
 _REASONS = {
@@ -51,12 +50,6 @@ _REASONS = {
     "reversal": (None, "the other way"),
 }
 _TWO_SIDED = "duration", "energy"
-# The same as kinds of departures of the whole body.
-_WHOLE_KINDS = {
-    "duration": ("too fast", "too slow"),
-    "mirror": (None, "on the other side"),
-    "arms": (None, "with the other arm"),
-}
 # A statistic beyond so many times its limit is a rejection, whatever the others are.
 _ALONE = 1.5
 
@@ -339,7 +332,9 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             those that are too short or too weak. ``score``: up to 1 is accepted. ``reason`` of a
             rejection, such as "too long, too weak"; empty if the trial is accepted.
         """
-        scores, facts, statistics, tails, acceptance = self._test(X, reference, params, "ActionDetector.report")
+        scores, facts, statistics, tails, acceptance = self._test(
+            X, reference, params, "ActionDetector.report"
+        )
         table = pd.DataFrame(statistics, index=facts.index)
         table["score"] = scores
         # What no test alone explains is that which adds most to the score.
@@ -372,6 +367,13 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         tags.input_tags.three_d_array = True
         tags.input_tags.allow_nan = takes_gaps(self.estimator)
         return tags
+
+    def _check_reference(self, reference, known, caller):
+        """Warn if a reference is refused, unless the person does the movement the other way."""
+        _, _, statistics, tails, acceptance = self._test(reference, None, {}, caller, known)
+        contrasts = [values for name, values in statistics.items() if name in self._tests.contrasts]
+        if not any(values.mean() > 1 for values in contrasts):
+            warn_of_reference(acceptance.scores(tails) > 1)
 
     def _learn(self, pipeline, X, params, groups, matches):
         """All tests, by the training trials of a fitted pipeline."""
@@ -435,10 +437,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         }
 
     def _test(self, X, reference, params, caller, known=None):
-        """Scores of trials, their facts, and what their reasons are found in.
-
-        ``known`` are matches of X that were made before, as `curves_of` takes them.
-        """
+        """Scores of trials, their facts, and what their reasons are found in."""
         check_is_fitted(self)
         tests = self._tests
         try:
@@ -446,8 +445,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             whole, reached = curves.whole[..., tests.columns], curves.match.reached
             of_person = None
             if reference is not None:
-                theirs = curves_of(self.estimator_, reference, {}, caller)
-                warn_of_reference(self._test(reference, None, {}, caller, theirs.known)[0] > 1)
+                theirs = curves_of(self.estimator_, reference, {}, caller, {})
+                self._check_reference(reference, theirs.known, caller)
                 of_person = fill_with_mean(theirs.whole[..., tests.columns], tests.aligned.mean_)
         except MissingMetadata as error:
             reason, name, _ = error.args
@@ -497,38 +496,6 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             far = np.maximum(far, statistics[name])
         scores = np.where(far > 1, np.maximum(scores, far), scores)
         return scores, curves.facts, statistics, tails, acceptance
-
-
-def verdict_of(detector, X, reference, params, caller, known):
-    """Whether a detector refuses trials, and what it alone tells of each as a whole.
-
-    Parameters
-    ----------
-    detector : ActionDetector
-        Fitted.
-    X, reference, params
-        As for ``predict``.
-    caller, known
-        As for `curves_of`.
-
-    Returns
-    -------
-    refused : ndarray of bool, shape (n_sequences,)
-    faults : list of list of WholeFault
-    """
-    scores, _, statistics, _, _ = detector._test(X, reference, params, caller, known)
-    faults = [[] for _ in scores]
-    for name, kinds in _WHOLE_KINDS.items():
-        for i, value in enumerate(statistics.get(name, ())):
-            kind, size, unit, deviation = kinds[int(value > 0)], np.nan, "", np.nan
-            if abs(value) <= 1 or kind is None:
-                continue
-            if name == "duration":
-                interval = detector._tests.intervals[name]
-                size, unit = float(interval.ratio(value)), "ratio"
-                deviation = float(value * interval.end)
-            faults[i].append(WholeFault(kind, 0.0, 1.0, size, unit, abs(value), deviation))
-    return scores > 1, faults
 
 
 def _check_steps(pipeline):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from sklearn.base import clone
-from sklearn.pipeline import FeatureUnion, Pipeline, make_pipeline
+from sklearn.pipeline import FeatureUnion, make_pipeline
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.axes import convert_to_parent_axes
@@ -25,6 +25,7 @@ from ..utils.pipelines import (
     find_synchronizer,
     flat_steps,
     refuse_params,
+    remembered_matches,
     union_transformers,
 )
 from .action_model import ActionModel
@@ -89,14 +90,15 @@ def curves_of(estimator, X, params, caller, known=None):
     caller : str
         The public function that the user called with (estimator, X), for messages.
     known : dict, default=None
-        As `matches_of_a_fit` gives it, if X were matched before.
+        As `matches_of_a_fit` gives it, which is what is known by default.
 
     Returns
     -------
     Curves
     """
     before, model = find_step(estimator, ActionModel)
-    return _Route.to(before, model).curves(X, params, caller, known or {})
+    known = remembered_matches() if known is None else known
+    return _Route.to(before, model).curves(X, params, caller, known)
 
 
 class View(NamedTuple):

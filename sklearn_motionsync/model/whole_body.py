@@ -19,9 +19,9 @@ _AT_ENDS = 0.05
 _SLOW = 0.02
 # Shares of the time are compared by their logarithms, with so much added; and the prior variance
 # of these.
-_ADDED, _PRIOR_VARIANCE = 0.2, 0.01
+_ADDED, _PRIOR_VARIANCE = 0.2, 0.015
 # A body moves too little, or too far, if another amplitude explains so much of how it differs.
-_EXPLAINED = 0.5
+_EXPLAINED = 0.35
 # The contrast of one column counts at most so often.
 _MOST_OF_COLUMN = 1.5
 # An action has a direction if its contrast is so many standard deviations, and if it and its way
@@ -49,7 +49,7 @@ class WholeFault(NamedTuple):
     excess : float
         In units of the limit: above 1.
     deviation : float
-        In standard deviations of people; NaN of a movement backwards.
+        In standard deviations of people; NaN where these are not known.
     """
 
     kind: str

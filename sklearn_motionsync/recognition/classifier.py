@@ -112,7 +112,7 @@ class ActionClassifier(
     --------
     synchronization_distances : One of the distances, for neighbours, clusters and maps.
     ActionDetector : Whether trials are one action, fitted on that action alone.
-    find_departures : Where trials depart from the class they were given.
+    find_departures : Where trials depart from the model of a class.
 
     Notes
     -----

@@ -25,7 +25,6 @@ __all__ = [
     "Routed",
     "accepted_params",
     "explain_missing",
-    "find_classifier",
     "find_step",
     "find_synchronizer",
     "flat_steps",
@@ -33,6 +32,7 @@ __all__ = [
     "matches_of_a_fit",
     "refuse_params",
     "remember_match",
+    "remembered_matches",
     "route_to_synchronizer",
     "steps_to_fit",
     "takes_gaps",
@@ -49,17 +49,23 @@ _matches: ContextVar[dict | None] = ContextVar("matches", default=None)
 
 
 @contextmanager
-def matches_of_a_fit():
+def matches_of_a_fit(known=None):
     """Collect the matches of the synchronizers that are fitted in this context.
 
     The ``fit`` of scikit-learn's pipelines warps the training trials and hands on no match. What
-    goes on with the same trials takes it from here and does not match them again.
+    goes on with the same trials takes it from here and does not match them again. Those that are
+    known already are given.
     """
-    token = _matches.set({})
+    token = _matches.set({} if known is None else known)
     try:
         yield _matches.get()
     finally:
         _matches.reset(token)
+
+
+def remembered_matches():
+    """The matches of `matches_of_a_fit`; none outside of it."""
+    return _matches.get() or {}
 
 
 def remember_match(synchronizer, match):
@@ -356,11 +362,6 @@ def find_synchronizer(estimator):
         return hasattr(step, "match") and hasattr(step, "check_trials")
 
     return _find(estimator, matches, "synchronizer")
-
-
-def find_classifier(estimator):
-    """The same for a classifier that has a model of each class; None if there is none."""
-    return _search(estimator, lambda step: hasattr(step, "model_of"))
 
 
 def flat_steps(estimator):

@@ -39,7 +39,8 @@ def bones(*pairs):
 def row(limb, first, last, peak=None, kind="angle", size=30.0, unit="degrees"):
     peak = first if peak is None else peak
     region = part_of_limb(limb)
-    return Departure(0, kind, limb, region, 0, first, last, peak, size, unit, 5.0, True)
+    places = first, last, peak, first, last, np.nan, np.nan
+    return Departure(0, kind, limb, region, None, 0, *places, size, unit, 5.0, True)
 
 
 def departures(rows, frames):
@@ -71,6 +72,15 @@ def test_every_limb_has_bones():
 )
 def test_departures_in_plain_words(kind, size, unit, text):
     assert describe_departure(row("left_arm", 0, 59, 3, kind, size, unit)) == text
+
+
+def test_directions_and_the_whole_body_in_plain_words():
+    flexed = row("left_forearm", 0, 5)._replace(direction="flexed")
+    assert describe_departure(flexed) == "left forearm 30° flexed"
+    late = row("whole body", 0, 9, kind="starts late", unit="percent")
+    assert describe_departure(late) == "whole body starts late"
+    # It is told in the heading, and marks no limb.
+    assert departures([late], 1)[1] == ["frame 29\nno limb departs"]
 
 
 def test_the_height_of_the_pelvis_in_plain_words():

@@ -65,8 +65,13 @@ def test_departures_are_runs_of_frames_the_worst_first():
     expected = pd.DataFrame(rows, columns=names).assign(rare=True, timing=False)
     expected = expected.assign(kind="value", unit="")
     pd.testing.assert_frame_equal(
-        table.drop(columns="size"), expected, check_dtype=False, check_like=True, rtol=1e-9
+        table[expected.columns], expected, check_dtype=False, check_like=True, rtol=1e-9
     )
+    assert table["direction"].tolist() == ["lower", "higher", "lower", "higher"]
+    # Without a synchronizer frames of the recording are those of the model.
+    for of_recording, of_model in (("start", "first"), ("end", "last")):
+        assert table[of_recording].tolist() == table[of_model].tolist()
+    assert table[["start_time", "end_time", "limb", "region"]].isna().all(axis=None)
     # In the unit of the feature.
     std = np.sqrt(MODEL.predictive_variance_)
     sizes = [-50 * std[20:30, 0].mean(), 30 * std[3:6, 0].mean(), -40 * std[7, 1], 20 * std[7, 0]]

@@ -342,9 +342,27 @@ def test_coverage_of_the_pipeline_does_not_count(detector):
     assert found.estimator_[-1].coverage == 0.5
 
 
-def test_find_departures_and_match_take_a_detector(detector):
+def test_rows_of_departures_are_the_reasons_of_a_detector(detector):
+    trials = [*X[:6], X[0][::-1], X[1][::4], X[2] * 3, np.zeros((40, 2)), X[3] + [0.0, 2.0]]
+    refused = detector.predict(trials) == -1
+    assert refused.any()
+    assert not refused.all()
+    found = find_departures(detector, trials)
+    assert set(found["trial"]) == set(np.flatnonzero(refused))
+    assert found["rare"].all()
+    assert found.groupby("trial").size().max() <= 5
+    # With a limit the rows are those beyond it, of all trials.
     pipe = detector.estimator_
-    pd.testing.assert_frame_equal(find_departures(detector, X[:3]), find_departures(pipe, X[:3]))
+    by_limit = find_departures(detector, trials, limit=0.5)
+    assert set(by_limit["trial"]) > set(found["trial"])
+    of_parts = by_limit[by_limit["feature"].notna()].drop(columns="rare")
+    expected = find_departures(pipe, trials, limit=0.5).drop(columns="rare")
+    expected = expected[expected["feature"].notna()]
+    assert len(of_parts.merge(expected)) == len(of_parts)
+
+
+def test_match_takes_a_detector(detector):
+    pipe = detector.estimator_
     times = Match.from_estimator(pipe, X).times
     np.testing.assert_array_equal(Match.from_estimator(detector, X).times, times)
 

@@ -29,7 +29,8 @@ def match_within(half_width, n=1):
 
 def departure(first, last):
     """Of the only feature of the first trial."""
-    return Departure(0, "value", None, None, 0, first, last, first, 1.0, "", 10.0, True)
+    places = first, last, first, first, last, np.nan, np.nan
+    return Departure(0, "value", None, None, None, 0, *places, 1.0, "", 10.0, True)
 
 
 @pytest.mark.parametrize(
