@@ -16,8 +16,6 @@ else:
     # matplotlib is imported on drawing.
     Animation = Any
 
-__all__ = ["MovingDisplay"]
-
 # Resolution of the pictures: the notebook stores all of them.
 _DPI = 64
 # The largest number of pictures: about half an hour at 15 a second.

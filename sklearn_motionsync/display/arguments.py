@@ -16,19 +16,6 @@ from ..inputs.tables import labels_of
 from ..utils.pipelines import flat_steps
 from .base import text_of_label
 
-__all__ = [
-    "as_frames",
-    "as_index",
-    "as_indices",
-    "as_names",
-    "as_trials",
-    "labels_of_signals",
-    "names_of_trials",
-    "time_label",
-    "times_from_zero",
-    "undo_scaling",
-]
-
 # Characters of a label and its unit that are too long for one line.
 _LONG = 18
 # The largest number of panels.

@@ -20,28 +20,6 @@ else:
     # matplotlib is imported on drawing.
     AxesLike = Any
 
-__all__ = [
-    "COLORS",
-    "WIDTH",
-    "AxesLike",
-    "Display",
-    "TimeAxis",
-    "curves",
-    "draw_keyframes",
-    "empty_lists",
-    "front_line",
-    "group_styles",
-    "legend_above",
-    "named_keyframes",
-    "offset_label",
-    "panels",
-    "parts_outside",
-    "pyplot",
-    "signal_layout",
-    "text_of_keyframe",
-    "text_of_label",
-]
-
 # Okabe and Ito's colours and a violet, which colour-blind people can distinguish. Each has one
 # meaning in all figures.
 COLORS = {

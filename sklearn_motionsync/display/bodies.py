@@ -15,18 +15,6 @@ from ..inputs.numbers import as_numbers, check_finite, column_names, nanmean
 from ..matching.gaps import interpolate_gaps
 from .base import COLORS
 
-__all__ = [
-    "BodyPanel",
-    "bones_by_side",
-    "bounds",
-    "invert_poses",
-    "landmark_track",
-    "place_on_floor",
-    "project",
-    "read_positions",
-    "stage",
-]
-
 # The picture follows a body that walks farther than this, in heights of the body.
 _FAR = 0.75
 # The smallest ratio of the sides of a picture.

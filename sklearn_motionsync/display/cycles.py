@@ -27,8 +27,6 @@ from ..takes.self_correlation import SelfCorrelation, required_strength
 from .arguments import labels_of_signals
 from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, legend_above
 
-__all__ = ["CycleDisplay"]
-
 
 @dataclass(eq=False, repr=False)
 class CycleDisplay(Display):

@@ -18,8 +18,6 @@ from ..inputs.wording import counted
 from .arguments import as_index
 from .base import WIDTH, AxesLike, Display, legend_above
 
-__all__ = ["GaitDisplay"]
-
 # Colours of the feet, and of strikes and foot-offs.
 _COLORS = {"left": "#D55E00", "right": "#0072B2"}
 _STYLES = {FOOT_STRIKE: "-", FOOT_OFF: ":"}

@@ -38,8 +38,6 @@ from .base import (
     text_of_keyframe,
 )
 
-__all__ = ["GroupCurves", "GroupDisplay", "NormDisplay"]
-
 # Signals that are shown when none are named; of more, the first few.
 _MOST = 6
 # Probability of the interval of a mean, and titles of the legend.

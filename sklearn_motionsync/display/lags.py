@@ -14,8 +14,6 @@ from ..synchronizers.parts import Lags, PartSynchronizer
 from ..utils.pipelines import route_to_synchronizer
 from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, curves, front_line, legend_above
 
-__all__ = ["LagDisplay"]
-
 _UNITS = {"frames": "frames", "percent": "% of the time", "seconds": "s"}
 # The largest number of curves in a row.
 _CURVES_A_ROW = 3

@@ -14,13 +14,6 @@ from ..model.departures import WHOLE, judge
 from ..utils.pipelines import find_step, find_synchronizer, flat_steps, union_transformers
 from .arguments import as_frames, as_index
 
-__all__ = [
-    "describe_departure",
-    "draw_departures",
-    "limb_departures",
-    "split_at_synchronizer",
-]
-
 # The pelvis is no limb; its height is marked on the hips.
 _HEIGHT, _PELVIS = "pelvis_height", "hip"
 # A frame given by index represents the frames around it, up to this share of the clock.

@@ -33,8 +33,6 @@ from .arguments import (
 from .base import COLORS, WIDTH, AxesLike, front_line, legend_above
 from .bodies import BodyPanel, bounds, invert_poses, project, stage
 
-__all__ = ["PhaseDisplay"]
-
 # The number of trials by default.
 _N_TRIALS = 4
 # The height of a row of panels in inches.

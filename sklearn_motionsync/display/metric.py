@@ -17,8 +17,6 @@ from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
 from .base import COLORS, WIDTH, AxesLike, Display, legend_above
 
-__all__ = ["MetricDisplay"]
-
 # The largest number of rows.
 _MAX_ROWS = 20
 

@@ -30,8 +30,6 @@ from .base import (
     parts_outside,
 )
 
-__all__ = ["ActionModelDisplay"]
-
 # Titles of the legend.
 _BAND_TITLES = {
     "points": "band holds single poses, not whole trials",

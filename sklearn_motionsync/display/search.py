@@ -17,8 +17,6 @@ from ..takes.search import find_trials
 from .arguments import as_trials
 from .base import COLORS, WIDTH, AxesLike, Display, legend_above
 
-__all__ = ["SearchDisplay"]
-
 # The lowest score of the axis, and the height of the strip of true segments below it.
 _BOTTOM, _STRIP = 0.3, 0.06
 # The largest number of panels.

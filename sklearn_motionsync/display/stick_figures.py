@@ -37,8 +37,6 @@ from .bodies import (
 )
 from .limb_departures import draw_departures, split_at_synchronizer
 
-__all__ = ["SkeletonDisplay"]
-
 # The largest number of panels in a row.
 _PANELS_A_ROW = 4
 # The height of a heading in inches, and its characters a line.

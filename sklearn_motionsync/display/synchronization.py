@@ -32,8 +32,6 @@ from .base import (
     offset_label,
 )
 
-__all__ = ["SynchronizationDisplay"]
-
 # The dots of doubtful trials, in line widths, and their opacity.
 _DOTTED, _STRONG = (0, (1, 1.4)), 0.9
 # Probability of the intervals around offsets.

@@ -21,8 +21,6 @@ from ..matching.counting import runs_of
 from .arguments import as_names, labels_of_signals, time_label, times_from_zero
 from .base import COLORS, WIDTH, AxesLike, Display, empty_lists, legend_above
 
-__all__ = ["TrackingDisplay"]
-
 # The number of features by default.
 _N_FEATURES = 4
 # Standard deviations on each side that contain 90 %.

@@ -14,8 +14,6 @@ from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .base import COLORS, WIDTH, AxesLike, Display, front_line, legend_above
 
-__all__ = ["TrellisDisplay"]
-
 
 @dataclass(eq=False, repr=False)
 class TrellisDisplay(Display):

@@ -15,8 +15,6 @@ from ..inputs.types import TrialsLike, ValuesLike
 from ..matching.counting import first_largest, parabola_vertex, whole
 from .recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings, Walk, horizontal, pieces
 
-__all__ = ["LEAST_STEP", "events_of", "gait_events", "tabulate_events"]
-
 # Standard deviations, in seconds, of the Gaussians for positions and for accelerations.
 _POSITION, _ACCELERATION = 0.03, 0.0175
 # A foot swings ahead by at least this share of the usual swing, and of the leg; strikes of a foot

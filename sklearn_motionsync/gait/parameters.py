@@ -14,8 +14,6 @@ from ..inputs.types import Table, TrialsLike, ValuesLike
 from .events import events_of
 from .recordings import FOOT_OFF, FOOT_STRIKE, Recordings, horizontal
 
-__all__ = ["gait_parameters"]
-
 # A foot on the ground that moves faster than so many leg lengths a second is on a belt. Feet that
 # slide by retargeting move by 0.1.
 _BELT = 0.25

@@ -21,17 +21,6 @@ from ..matching.counting import runs_of, whole
 from ..matching.filters import smooth
 from ..matching.gaps import interpolate_gaps
 
-__all__ = [
-    "CONTEXTS",
-    "FOOT_OFF",
-    "FOOT_STRIKE",
-    "Recordings",
-    "Walk",
-    "horizontal",
-    "joints_of_feet",
-    "pieces",
-]
-
 # Frames beyond an end that are rounding.
 _MARGIN = 0.5
 # Least and largest frames a second.

@@ -12,8 +12,6 @@ from scipy.signal import lfilter
 
 from ..matching.tile import TIE, Bases, Tile, right_factor
 
-__all__ = ["CausalDerivative", "CausalTrellis", "causal_velocity"]
-
 # Gaps longer than this, in widths of the filter, are not bridged: the filter restarts.
 _BRIDGED = 3
 # After so many widths both filters have forgotten everything.

@@ -16,22 +16,6 @@ from .state_space import (
     whitening,
 )
 
-__all__ = [
-    "HistoryFrame",
-    "ParticleFilter",
-    "Particles",
-    "PathFrame",
-    "RunningTake",
-    "Track",
-    "filter_take",
-    "simulate_backwards",
-    "smooth_deviations",
-    "smooth_take",
-    "stack_frames",
-    "systematic_resampling",
-    "weighted_median",
-]
-
 # Weights before anything is observed: of the member that knows phases, and of the other one.
 _PRIOR = np.array([0.75, 0.25])
 # Covariances are larger by this share of the pooled variances, so that they can be inverted.

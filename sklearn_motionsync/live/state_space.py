@@ -7,19 +7,6 @@ from scipy.linalg.lapack import dtrtri
 
 from ..utils.groups import mean_of_others
 
-__all__ = [
-    "CausalSlopes",
-    "Clock",
-    "DeviationFilter",
-    "KalmanUpdate",
-    "MaternProcess",
-    "RateProcess",
-    "TrackerModel",
-    "exponential_average",
-    "squared_norms",
-    "whitening",
-]
-
 # Window of causal velocities, as a share of the mean duration: that of the synchronizers' filter.
 _WINDOW = 0.03
 # Time constant of the averages of the NIS, in windows.

@@ -10,8 +10,6 @@ import pandas as pd
 from ..inputs.numbers import LARGEST, SMALLEST, as_numbers, check_finite, check_names
 from .causal import CausalDerivative
 
-__all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times"]
-
 # Shares of the clock: the window of rate and cost, and how near a phase counts as right.
 _WINDOW, _TOLERANCE = 0.1, 0.05
 # Probabilities below the bounds of an interval; half of its least width, as a share of the clock.

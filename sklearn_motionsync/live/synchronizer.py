@@ -42,8 +42,6 @@ from .stream import (
     window_length,
 )
 
-__all__ = ["OnlineSynchronizer", "Reference"]
-
 
 class OnlineSynchronizer(
     DocumentedMixin, LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator

@@ -29,12 +29,6 @@ from .members import RunningTake, Track, filter_take, smooth_take, stack_frames
 from .state_space import Clock, TrackerModel
 from .stream import check_observations, check_times, times_of_each
 
-__all__ = [
-    "MotionTracker",
-    "Observer",
-    "check_projection",
-]
-
 
 class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """Track a body that is partly hidden, by the mean of its action and the variation of people.

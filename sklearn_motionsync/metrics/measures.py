@@ -15,11 +15,6 @@ from ..inputs.types import Indexed, NumbersLike, ValuesLike
 from ..inputs.wording import counted
 from ..matching.warps import evaluate_warps
 
-__all__ = [
-    "group_timing_error",
-    "keyframe_error",
-]
-
 # Rounding of warps, in frames: bounds may be exceeded by as much.
 _ROUNDING = 1e-9
 

@@ -18,8 +18,6 @@ from ..matching.warps import normalise
 from ..utils.pipelines import accepted_params, route_to_synchronizer
 from .spread import least_squares
 
-__all__ = ["FeatureHoldoutScorer", "SpreadScorer"]
-
 
 class _SynchronizerScorer(BaseEstimator):
     """Base of the scorers: the metadata that may be requested, and what is scored.

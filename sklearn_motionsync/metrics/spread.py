@@ -14,11 +14,6 @@ from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, check_finite, nanmean
 from ..inputs.types import TrialsLike
 
-__all__ = [
-    "amplitude_phase_variance",
-    "least_squares",
-]
-
 
 def least_squares(before: TrialsLike, after: TrialsLike) -> float:
     """Ratio of squared differences after and before: 1 for no gain, 0 for identical trials.

@@ -8,18 +8,6 @@ from scipy.stats import t as student
 
 from ..utils.groups import mean_of_others
 
-__all__ = [
-    "DISSIMILARITY_VARIANCE",
-    "LEAST",
-    "Acceptance",
-    "Contrast",
-    "LogMoments",
-    "LogPredictionInterval",
-    "dissimilarity_tails",
-    "log_moments",
-    "t_prediction_limit",
-]
-
 # Variance of the logarithm over trials of one action (16 actions of people); it weighs as
 # much as that of so many trials. That of a dissimilarity is the mean over 21 actions.
 _PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3

@@ -43,8 +43,6 @@ from .variation import (
     simultaneous_factor,
 )
 
-__all__ = ["KEPT", "ActionModel"]
-
 # Attribute of fitted models: what was learnt of them when departures were first asked for.
 KEPT = "_expected"
 

@@ -26,8 +26,6 @@ from .faults import FaultFinder, Part, expected_trial
 from .views import View, limbs_of, view_of
 from .whole_body import WholeBody, WholeFault
 
-__all__ = ["WHOLE", "Judged", "find_departures", "judge"]
-
 # A floor of the variance of limbs, in units of that outside of the components that hold so much.
 # Chosen on HDM05 and two exercises of UI-PRMD.
 _OUTSIDE, _HELD = 8, 0.95

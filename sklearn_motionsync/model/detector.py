@@ -36,8 +36,6 @@ from .action_model import ActionModel
 from .similarity import PersonalReference, TrialStream, movement_energies, warn_of_reference
 from .views import curves_of
 
-__all__ = ["ActionDetector"]
-
 # Reasons for the rejection of a trial below, or above, the accepted interval.
 _REASONS = {
     "movement": (None, "another movement"),

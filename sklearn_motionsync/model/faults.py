@@ -15,8 +15,6 @@ from ..matching.warps import at_times
 from .acceptance import t_prediction_limit
 from .variation import predictive_variance, within_variance
 
-__all__ = ["Expectation", "FaultFinder", "FoundFault", "Part", "expected_trial"]
-
 # All was chosen on HDM05 and two exercises of UI-PRMD (benchmarks/departures.py).
 # Frames of the clock on which faults are sought, at most.
 _MOST_FRAMES = 60

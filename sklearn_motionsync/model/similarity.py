@@ -15,17 +15,6 @@ from ..utils.parallel import one_blas_thread
 from .acceptance import DISSIMILARITY_VARIANCE, LEAST, LogMoments, log_moments
 from .variation import within_variance
 
-__all__ = [
-    "Neighbours",
-    "PersonalReference",
-    "TrialStream",
-    "Weights",
-    "distances_by_differences",
-    "learn_weights",
-    "movement_energies",
-    "warn_of_reference",
-]
-
 # A dissimilarity is the mean over so many nearest neighbours: a single one may be an outlier.
 _N_NEAREST, _N_NEAREST_LEARNT = 2, 3
 # Weight of the mean pose: people stand differently, but an action elsewhere is another action.

@@ -15,16 +15,6 @@ from ..matching.gaps import is_gappy
 from ..utils.groups import group_counts, mean_of_others, sums_of_groups
 from .acceptance import LogMoments
 
-__all__ = [
-    "clock_error",
-    "mean_band",
-    "predictive_variance",
-    "sample_poses",
-    "sample_trials",
-    "simultaneous_factor",
-    "within_variance",
-]
-
 # A variance is shrunk to its mean over the frames, which weighs as much as so many trials.
 _SHRINKAGE = 5
 # Prior variance of the logarithm of the largest deviation: it is 0.05 to 0.3 in the classes of

@@ -30,15 +30,6 @@ from ..utils.pipelines import (
 )
 from .action_model import ActionModel
 
-__all__ = [
-    "Curves",
-    "LimbColumns",
-    "View",
-    "curves_of",
-    "limbs_of",
-    "view_of",
-]
-
 # Residual variance of a new person at a frame, in units of the mean residual variance of the
 # training poses after the aSpace: with this 93 and 94 % of held-out actors have no rare
 # departure (HDM05, UTKinect; nominal 95 %), with 1 it was 80 and 84 %.

@@ -9,8 +9,6 @@ from ..matching.filters import smooth
 from ..utils.groups import mean_of_others
 from .acceptance import LogPredictionInterval
 
-__all__ = ["WholeBody", "WholeFault"]
-
 # Standard deviation of the Gaussian under which speeds are estimated, as a share of the time.
 _SMOOTHING = 0.01
 # A movement starts, and stops, where so much of its squared speed is over, or is still to come.

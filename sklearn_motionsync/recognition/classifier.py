@@ -31,8 +31,6 @@ from ..utils.parallel import LongWorkMixin, one_blas_thread
 from ..utils.parameters import validated
 from .kernel import MotionKernel, assign_folds, decision_values, fit_regression
 
-__all__ = ["ActionClassifier"]
-
 # The coverage of reject_below="auto".
 _COVERAGE = 0.95
 # The golden ratio less 1.

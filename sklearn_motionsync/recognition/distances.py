@@ -27,15 +27,6 @@ from ..matching.warps import even_slices, normalise
 from ..utils.parallel import Progress, run
 from ..utils.parameters import validated_function
 
-__all__ = [
-    "BLOCK",
-    "PairwiseDistance",
-    "blocks_of_pairs",
-    "normalise_time",
-    "pairwise_distances",
-    "synchronization_distances",
-]
-
 # Bases, and moving sequences, of a block; of few of the one there are more of the other. Of 50
 # frames 8 x 8 take 1.5 times as long a pair, 16 x 32 as long, 1 x 256 1.2 times.
 BLOCK = 16

@@ -11,21 +11,6 @@ from sklearn.model_selection import GroupKFold
 from ..matching.counting import first_largest
 from .distances import PairwiseDistance, normalise_time, pairwise_distances
 
-__all__ = [
-    "KernelRegression",
-    "MotionKernel",
-    "align_weights",
-    "assign_folds",
-    "change_extremes",
-    "change_shares",
-    "changes_of",
-    "decision_values",
-    "fit_regression",
-    "fit_temperature",
-    "fold_gain",
-    "held_out_decisions",
-]
-
 # The costs of the distances: two of velocities, which make the view of shape, and one of poses.
 _COSTS = "velocity", "elastic", "pose"
 # Largest offset of the distances, as a share of the clock.

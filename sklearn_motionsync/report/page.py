@@ -15,15 +15,6 @@ from ..display.base import pyplot
 from ..matching.counting import whole
 from ..utils.files import write_whole
 
-__all__ = [
-    "Page",
-    "number",
-    "paragraph",
-    "picture",
-    "read_part",
-    "table_of",
-]
-
 # Pixels an inch of the figures.
 DPI = 180
 # Where a spreadsheet would begin to read a formula.

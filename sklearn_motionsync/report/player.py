@@ -31,8 +31,6 @@ from ..utils.files import check_path
 from ..utils.pipelines import transform_through, union_transformers
 from .page import Page, paragraph, read_part
 
-__all__ = ["add_player_of", "write_player"]
-
 # Coordinates that a report holds, at most, of two bytes each: 4 MB of text. And frames a trial that
 # a movement needs at least; where these are too many, there are fewer trials.
 MOST_COORDINATES, _FEWEST_FRAMES = 1_500_000, 25

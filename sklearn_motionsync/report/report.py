@@ -51,8 +51,6 @@ from ..utils.pipelines import index_of_pattern
 from .page import Page, number, paragraph, picture, table_of
 from .player import add_player_of
 
-__all__ = ["TrialSet", "draw_offsets", "draw_signals", "own_figures", "write_report"]
-
 # Signals in the figure if none are named; of more, the first four.
 _MOST_SIGNALS = 6
 # Numbers of the tables that have a row a frame, at most: some 4 MB of text.

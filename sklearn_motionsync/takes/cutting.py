@@ -8,8 +8,6 @@ from ..inputs.numbers import as_numbers
 from ..inputs.recorded import Recorded
 from ..inputs.tables import FRAME, as_pandas, label_of_part, own_label
 
-__all__ = ["as_takes", "cut_takes"]
-
 
 def as_takes(X, *, univariate=False):
     """A collection of takes; a single take (n_frames, n_features) as a list of one.

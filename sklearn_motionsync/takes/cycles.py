@@ -48,15 +48,6 @@ from .stretches import (
     summary_of,
 )
 
-__all__ = [
-    "CycleSegmenter",
-    "as_learnt",
-    "check_takes",
-    "compared_names",
-    "correlate_takes",
-    "start_curves",
-]
-
 # A fit matches the takes to the pattern, and estimates it again, so many times.
 _ROUNDS = 2
 # Cycles are as long as the learnt ones up to the first ratio, and the same up to the second.

@@ -40,8 +40,6 @@ from ..utils.pipelines import (
 from .cutting import as_takes, cut_takes
 from .windows import WindowDissimilarity, example_indices
 
-__all__ = ["find_trials"]
-
 # The clock of a pattern that is given as an array has at most so many frames.
 _CLOCK = 100
 # Hits may be shorter and longer than the training trials by this ratio; the larger one is for

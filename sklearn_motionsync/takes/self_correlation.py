@@ -15,19 +15,6 @@ from ..inputs.wording import counted
 from ..matching.counting import parabola_vertex, whole
 from ..matching.filters import smooth
 
-__all__ = [
-    "LEAST_CYCLES",
-    "SelfCorrelation",
-    "breadth_of",
-    "correlate",
-    "noise_gain",
-    "noise_of",
-    "rejection_reason",
-    "required_strength",
-    "self_correlation",
-    "smoothing_width",
-]
-
 # Cycles that a take must hold at least to show that it repeats.
 LEAST_CYCLES = 1.6
 # The shortest overlap of a take with itself, as a share of the take.

@@ -24,23 +24,6 @@ from .self_correlation import (
     smoothing_width,
 )
 
-__all__ = [
-    "FOLLOWS",
-    "PHASES",
-    "Repeats",
-    "SampledStretch",
-    "Stretch",
-    "average_cycle",
-    "circular_peak",
-    "constant_phases",
-    "find_repeats",
-    "locate_cycles",
-    "match_phases",
-    "move_to_events",
-    "similarity",
-    "summary_of",
-]
-
 # Lags in frames at which a take is compared with itself, in groups that are filtered alike; for
 # longer ones the take is halved again and again, and compared at the last of these.
 _GROUPS = ((3, 6), (6, 12), (12, 24), (24, 48))

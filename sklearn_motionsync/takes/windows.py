@@ -11,8 +11,6 @@ from ..model.acceptance import LEAST, LogMoments, log_moments
 from ..model.similarity import Neighbours, distances_by_differences, movement_energies
 from ..utils.groups import encode_groups
 
-__all__ = ["WindowDissimilarity", "example_indices", "random_movements"]
-
 # Weight of the squared standard scores of length and energy in the logarithm of the dissimilarity.
 _LENGTH_ENERGY_WEIGHT = 0.05
 # Largest logarithm of the factor by which they raise it.

@@ -1,7 +1,5 @@
 """What estimators show in a notebook: diagrams that link to their page of the manual."""
 
-__all__ = ["DOCUMENTATION", "DocumentedMixin"]
-
 DOCUMENTATION = "https://sklearn-motionsync.readthedocs.io/en/latest"
 # Rooms whose estimators have their page under the name of the room; those of others are at the top.
 _NAMED_ROOMS = {"live", "takes"}

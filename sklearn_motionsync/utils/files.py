@@ -3,8 +3,6 @@
 import pathlib
 import uuid
 
-__all__ = ["check_path", "write_whole"]
-
 
 def check_path(path, example):
     """A path at which a file can be written, such as ``example``."""

@@ -11,17 +11,6 @@ from sklearn.utils.multiclass import check_classification_targets
 
 from ..matching.gaps import is_gappy
 
-__all__ = [
-    "add_unknown_label",
-    "encode_classes",
-    "encode_groups",
-    "group_counts",
-    "mean_of_others",
-    "names_of_groups",
-    "refuse_classes_as_people",
-    "sums_of_groups",
-]
-
 # NumPy scalars that equal Python ones, as which they are kept.
 _SCALARS = np.str_, np.number, np.bool_
 _NOT_LISTS = str, bytes, Mapping, Set

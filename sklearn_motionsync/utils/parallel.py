@@ -16,8 +16,6 @@ from joblib.parallel import get_active_backend
 from sklearn import config_context, get_config
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["LongWorkMixin", "Progress", "one_blas_thread", "run"]
-
 try:
     from sklearn.callback import CallbackSupportMixin
 except ImportError:  # scikit-learn before 1.9 has no callbacks

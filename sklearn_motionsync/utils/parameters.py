@@ -10,15 +10,6 @@ from sklearn.utils._param_validation import Interval, validate_params
 
 from ..matching.sizes import RATES
 
-__all__ = [
-    "FRAME_RATE",
-    "Rate",
-    "error_of_old_name",
-    "validated",
-    "validated_function",
-    "validated_with_nested",
-]
-
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 

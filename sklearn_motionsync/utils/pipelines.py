@@ -20,27 +20,6 @@ from ..inputs.resampling import as_frame_rates
 from ..inputs.trial_facts import TrialFacts
 from ..inputs.wording import counted
 
-__all__ = [
-    "MissingMetadata",
-    "Routed",
-    "accepted_params",
-    "explain_missing",
-    "find_step",
-    "find_synchronizer",
-    "flat_steps",
-    "index_of_pattern",
-    "matches_of_a_fit",
-    "refuse_params",
-    "remember_match",
-    "remembered_matches",
-    "route_to_synchronizer",
-    "steps_to_fit",
-    "takes_gaps",
-    "transform_through",
-    "union_transformers",
-]
-
-
 # Parameters of synchronizers that take key-frames.
 _OF_KEYFRAMES = ("keyframes", "frame_rate")
 
