@@ -245,7 +245,7 @@ class Judged(NamedTuple):
     far: float
 
     def rows(self, i, limit):
-        """The rows of a trial, the most important first: of the whole body, then of its parts.
+        """The rows of a trial, the most important first.
 
         Those beyond a limit of the deviation. If it is None, those with more evidence than usual,
         and those that are far away: a body that is wrong altogether has no limb that is. The
@@ -254,23 +254,28 @@ class Judged(NamedTuple):
         is_refused = limit is None and self.refused is not None and bool(self.refused[i])
         if limit is None and self.refused is not None and not is_refused:
             return []
-        of_whole = sorted(self.of_whole[i], key=lambda fault: -fault.excess)
-        rows = [
-            self._row_of_whole(i, fault)
-            for fault in of_whole
-            if np.isnan(fault.deviation) or abs(fault.deviation) > (limit or 0)
-        ]
+        # Rows, and how far their evidence is beyond what is rare.
+        rows, evidence = [], []
         for fault in self.faults[i]:
             row = self._row(i, fault)
             if row is None or not abs(row.deviation) > (limit or 0):
                 continue
             far = abs(self.scores[i, row.peak, row.feature]) > self.far
-            is_listed = far or fault.score > self.usual_score or (is_refused and not rows)
+            is_listed = far or is_refused or fault.score > self.usual_score
             if limit is None and not is_listed:
                 continue
             same = [r for r in rows if r.feature == row.feature and r.unit == row.unit]
             if not any(r.first <= row.peak <= r.last for r in same):
                 rows.append(row)
+                evidence.append(min([fault.score / self.rare_score, *evidence[-1:]]))
+        for fault in self.of_whole[i]:
+            # Of one that is backwards, or of another side, limbs tell nothing.
+            is_another = np.isnan(fault.deviation)
+            if is_another or abs(fault.deviation) > (limit or 0):
+                rows.append(self._row_of_whole(i, fault))
+                evidence.append(np.inf if is_another else fault.excess)
+        order = np.argsort(-np.array(evidence), kind="stable")
+        rows = [rows[k] for k in order]
         if is_refused and not rows:
             another = WholeFault("another movement", 0.0, 1.0, np.nan, "", np.nan, np.nan)
             rows = [self._row_of_whole(i, another)]
@@ -364,14 +369,17 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     finder = expected.finder(of_person, of_person_in_time)
     curves, filled = view.whole[..., expected.chosen], expected.filled(view.whole)
     converted, later = expected.space.convert(filled), expected.in_linear_time(filled, match)
-    in_time = converted if later is None else later
     faults = [[] for _ in range(n)]
     for i in sought:
         faults[i] = finder.find(converted[i], None if later is None else later[i])
-    of_whole = [[] for _ in range(n)]
-    if expected.whole_body is not None:
-        pairs = zip(in_time, converted[..., : in_time.shape[2]], strict=True)
-        of_whole = [expected.whole_body.find(*pair) for pair in pairs]
+    of_whole = expected.faults_of_whole(converted, later)
+    if reference is not None:
+        # What the person does in most right trials is no fault.
+        converted_of_person = expected.space.convert(of_person)
+        usual = expected.faults_of_whole(converted_of_person, of_person_in_time)
+        kinds = [fault.kind for faults_of_one in usual for fault in faults_of_one]
+        is_usual = {kind: kinds.count(kind) > len(usual) / 2 for kind in kinds}
+        of_whole = [[f for f in of_one if not is_usual.get(f.kind)] for of_one in of_whole]
     refused, detector = None, getattr(estimator, "best_estimator_", estimator)
     if isinstance(detector, ActionDetector):
         with matches_of_a_fit(view.curves.known):
@@ -466,6 +474,14 @@ class _Expected:
         on_clock, groups = self.space.convert(self.training), self.view.model.groups_
         in_time = (on_clock, groups) if self._linear is None else self._linear
         return WholeBody(*in_time, on_clock[..., : in_time[0].shape[2]], groups, coverage)
+
+    def faults_of_whole(self, on_clock, in_time):
+        """The faults of whole trials (n, P, n_columns), a list of each."""
+        if self.whole_body is None:
+            return [[] for _ in on_clock]
+        in_time = on_clock if in_time is None else in_time
+        pairs = zip(in_time, on_clock[..., : in_time.shape[2]], strict=True)
+        return [self.whole_body.find(*pair) for pair in pairs]
 
     @cached_property
     def far(self):
