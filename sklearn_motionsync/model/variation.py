@@ -253,10 +253,9 @@ def _floor(trials):
 # -- new trials ------------------------------------------------------------------------------
 
 # Shares of the variance of a sampled pose: of one training trial, of a mixture of all,
-# and of noise that is independent in every feature; a sampled trial has the first two. Noise
-# tangles limbs; the first keeps bodies in one piece and styles apart (docs/design.md).
+# and of noise that is independent in every feature. Noise tangles limbs; the first keeps bodies in
+# one piece and styles apart (docs/design.md).
 _POSE = (0.84, 0.14, 0.02)
-_TRIAL = (0.64, 0.36)
 # A trial that is outside reaches its training trial in so many steps.
 _STEPS = 4
 
@@ -291,7 +290,9 @@ def sample_poses(mean, variance, deviations, n, n_std, random_state):
     shapes = (deviations - deviations.mean(axis=0)) / np.where(spread > 0, spread, 1)
     chosen = random_state.randint(len(shapes), size=n)
     one, mixed, noise = _POSE
-    z = _mixtures(chosen, len(shapes), one, mixed, random_state) @ shapes
+    weights = random_state.standard_normal((n, len(shapes))) * np.sqrt(mixed / len(shapes))
+    weights[np.arange(n), chosen] += np.sqrt(one)
+    z = weights @ shapes
     z += np.sqrt(noise) * random_state.standard_normal(z.shape)
     std = np.sqrt(variance)
     lower, upper = mean - n_std * std, mean + n_std * std
@@ -302,9 +303,9 @@ def sample_poses(mean, variance, deviations, n, n_std, random_state):
 def sample_trials(mean, variance, deviations, n, dissimilarity, threshold, random_state):
     """Sample whole trials, of a dissimilarity up to a threshold.
 
-    Each is a random mixture of the training trials' deviations, dominated by one that is
-    inside itself, with the variance of all. A sample outside moves in steps to that training
-    trial; not to the mean, which need not be inside. Features that are directions are mixed
+    Each is a random mixture of the deviations of all training trials, with the variance of all. A
+    sample outside moves in steps to a training trial that is inside; not to the mean, which need
+    not be. Features that are directions are mixed
     in the tangent space of the sphere at their mean, and keep the length 1 (`directions_in`).
 
     Parameters
@@ -332,7 +333,7 @@ def sample_trials(mean, variance, deviations, n, dissimilarity, threshold, rando
     inside = np.flatnonzero(of_known <= threshold)
     centers = inside if len(inside) else np.array([first_smallest(of_known)])
     chosen = centers[random_state.randint(len(centers), size=n)]
-    weights = _mixtures(chosen, len(known), *_TRIAL, random_state)
+    weights = random_state.standard_normal((n, len(known))) / np.sqrt(len(known))
     drawn = np.tensordot(weights, known - known.mean(axis=0), axes=1)
     drawn *= _scale(variance, deviations)
     samples = space.trials(drawn)
@@ -345,13 +346,6 @@ def sample_trials(mean, variance, deviations, n, dissimilarity, threshold, rando
         coordinates = (1 - share) * drawn[outside] + share * known[chosen[outside]]
         samples[outside] = space.trials(coordinates)
     return samples
-
-
-def _mixtures(chosen, n_kept, one, mixed, random_state):
-    """Weights (n, n_kept) of mixtures: shares of the variance of one trial, and of all."""
-    weights = random_state.standard_normal((len(chosen), n_kept)) * np.sqrt(mixed / n_kept)
-    weights[np.arange(len(chosen)), chosen] += np.sqrt(one)
-    return weights
 
 
 def _truncate(z, n_std):
