@@ -18,8 +18,6 @@ from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import Match, check_unit, match_of_times
 from ..utils.pipelines import Routed, route_to_synchronizer
 
-__all__ = ["AlignedCurves"]
-
 # Features are left out of a match in so many parts.
 _MOST_PARTS = 8
 

@@ -24,8 +24,6 @@ from ..synchronizers.match import check_unit
 from ..utils.parallel import Progress
 from .study import GroupsOfPeople, Study, check_test, families
 
-__all__ = ["compare_events"]
-
 
 def compare_events(
     X: TrialsLike,

@@ -17,8 +17,6 @@ from ..utils.parallel import Progress
 from .curves import AlignedCurves
 from .study import Study, check_test, families, share_at_most
 
-__all__ = ["GroupComparison", "compare_aligned", "compare_groups"]
-
 # A difference in timing that is left, as a share, whichever signal is left out of the match.
 _REMAINS = 0.5
 

@@ -20,8 +20,6 @@ from ..utils.groups import encode_groups, refuse_classes_as_people
 from .curves import AlignedCurves
 from .study import check_level
 
-__all__ = ["NormComparison", "compare_to_norm"]
-
 # The variance at a frame is shrunk to the mean over the frames, which weighs as many people.
 _SHRINKAGE = 20
 # Prior variance of the logarithm of the largest deviation, as of `simultaneous_factor`.

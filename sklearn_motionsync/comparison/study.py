@@ -20,20 +20,6 @@ from ..matching.counting import first_largest, first_smallest
 from ..utils.groups import encode_groups, refuse_classes_as_people
 from ..utils.parallel import run
 
-__all__ = [
-    "Design",
-    "Family",
-    "GroupsOfPeople",
-    "Study",
-    "band_of_mean",
-    "check_level",
-    "check_test",
-    "enhanced",
-    "families",
-    "scaled",
-    "share_at_most",
-]
-
 # Fewest units: people, or trials without people.
 _FEWEST = 4
 # Rounding of sums that are equal.

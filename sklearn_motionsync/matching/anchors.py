@@ -18,8 +18,6 @@ import numpy as np
 
 from .counting import ROUNDING
 
-__all__ = ["Anchors", "KeyframeColumns", "add_ramps", "first_meeting", "pin"]
-
 # Most that a key-frame costs, in energies of a whole clip: a label with an error, of which some are
 # wrong, and one that is exact. docs/design.md.
 _LABEL, _EXACT = 0.05, 2.0

@@ -6,8 +6,6 @@ from .counting import ROUNDING
 from .filters import smooth
 from .warps import evaluate_warps
 
-__all__ = ["choose_exemplars", "exemplars_of_each", "smooth_warps", "vote"]
-
 
 def choose_exemplars(global_distances, n_exemplars, pattern=None):
     """Indices of exemplars: evenly spread over the more typical half of the trials.

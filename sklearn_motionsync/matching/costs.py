@@ -7,8 +7,6 @@ import numpy as np
 
 from .counting import whole
 
-__all__ = ["COSTS", "RATE_WEIGHT", "Cost", "StepGroup", "StepTable", "group_steps", "step_table"]
-
 # w of the velocity cost, from the measurement in docs/design.md.
 RATE_WEIGHT = 0.2
 

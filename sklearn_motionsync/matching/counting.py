@@ -7,8 +7,6 @@ So what is counted or chosen is decided here, with a tolerance.
 
 import numpy as np
 
-__all__ = ["ROUNDING", "first_largest", "first_smallest", "parabola_vertex", "runs_of", "whole"]
-
 # Values that differ by a smaller share are equal.
 ROUNDING = 1e-9
 # A value is a whole or a half number if it is this near to one; or, of a large one, if the share

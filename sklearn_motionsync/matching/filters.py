@@ -10,8 +10,6 @@ from sklearn import get_config
 
 from .counting import ROUNDING
 
-__all__ = ["FINE_SMOOTHING", "SMOOTHING", "noise_width", "smooth", "white_noise"]
-
 # Standard deviation of a Gaussian, as a share of the clip, that preserves human movement
 # and removes the noise of motion capture; and a finer one, for velocities under a metric, which
 # weights noise down, and for offsets after a vote: docs/design.md.

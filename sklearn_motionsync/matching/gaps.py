@@ -17,16 +17,6 @@ from .counting import runs_of
 from .filters import SMOOTHING
 from .sizes import BATCH, CONSTANT
 
-__all__ = [
-    "UNSEEN",
-    "Filler",
-    "add_weights",
-    "fill_with_mean",
-    "interpolate_gaps",
-    "is_gappy",
-    "moments_of_seen",
-]
-
 # Cost of a frame of which nothing was seen, in mean squared features: about that of two matched
 # ones. Without it a path would stay where nothing was seen. docs/design.md.
 UNSEEN = 0.3

@@ -29,16 +29,6 @@ from .uncertainty import uncertainty_of_paths
 from .units import Unit
 from .warps import evaluate_warps, normalise
 
-__all__ = [
-    "Features",
-    "Matcher",
-    "PartWarper",
-    "PathSettings",
-    "Warper",
-    "cost_features",
-    "learn_features",
-]
-
 # By how many times fewer frames than all are worth it where only the median is wanted.
 _WORTH = 1.5
 

@@ -13,8 +13,6 @@ from .counting import first_smallest
 from .sizes import BATCH
 from .warps import even_slices
 
-__all__ = ["MOST_REFERENCES", "Median", "draw_references", "linear_median", "median_of_sums"]
-
 # Most trials that every other one is matched with.
 MOST_REFERENCES = 100
 

@@ -14,18 +14,6 @@ from .costs import RATE_WEIGHT
 from .counting import ROUNDING
 from .warps import evaluate_warps, sample
 
-__all__ = [
-    "LONGEST_LAG",
-    "RETAINED",
-    "RIDGE",
-    "Evidence",
-    "Metric",
-    "compressed",
-    "energy_shares",
-    "metric_of_matches",
-    "without_mean",
-]
-
 
 class Metric(NamedTuple):
     """How velocities and poses become the points that are compared.

@@ -20,14 +20,6 @@ from .filters import LEAST_SIGMA, SMOOTHING, smooth
 from .metric import LONGEST_LAG
 from .sizes import EQUAL
 
-__all__ = [
-    "SAME_SOURCE",
-    "Refiner",
-    "curvature",
-    "typical_energy",
-    "unexplained_variance",
-]
-
 # Largest share of the variance that matching leaves of copies of one source: docs/design.md.
 SAME_SOURCE = 0.025
 # Expected change of the rate over the whole clip, in units of the mean rate.

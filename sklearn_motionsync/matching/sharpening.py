@@ -23,8 +23,6 @@ from .sizes import BATCH_NUMBERS, FRAMES
 from .tile import Bases
 from .trellis import Trellis
 
-__all__ = ["Sharpener"]
-
 # Narrowest smoothing of velocities, and that of what sharpening changes, as shares of the clip.
 _FINEST = 0.01
 # Speed, in units of the typical one, below which a root is linear: docs/design.md.

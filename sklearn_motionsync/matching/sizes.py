@@ -6,8 +6,6 @@ None of them changes a result by more than rounding. Those of the tiles of the t
 
 import numpy as np
 
-__all__ = ["BATCH", "BATCH_NUMBERS", "CONSTANT", "EQUAL", "FRAMES", "RATES"]
-
 # Trials that are processed at a time, and numbers in an intermediate array.
 BATCH = 64
 BATCH_NUMBERS = 1 << 20

@@ -11,8 +11,6 @@ import math
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-__all__ = ["PRODUCT_ROWS", "ROW_BYTES", "TIE", "Bases", "Tile", "right_factor", "tile_paths"]
-
 # Samples of a single base that share one product.
 PRODUCT_ROWS = 16
 # Costs of paths that differ by less than this share of all energy are ties. Rounding to

@@ -34,8 +34,6 @@ from .counting import whole
 from .tile import PRODUCT_ROWS, ROW_BYTES, TIE, Bases, Tile, right_factor, tile_paths
 from .warps import even_slices
 
-__all__ = ["Coupling", "Trellis"]
-
 # Sizes of one tile of pairs: the matrix product of a row stays below the size from which OpenBLAS
 # packs its operands (1.0 against 0.7 ns a cell), and has enough columns. Constants, so that no
 # result can depend on the number of workers or on the memory of the machine.

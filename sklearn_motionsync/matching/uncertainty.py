@@ -15,8 +15,6 @@ from .tile import Bases, Tile, right_factor
 from .trellis import Trellis
 from .warps import even_slices
 
-__all__ = ["Uncertainty", "coverage_factor", "uncertainty_of_paths"]
-
 # Half-widths of 90 %, in mean distances of the paths: docs/design.md.
 _SCALE = 2.2
 # Half-widths grow with the coverage c as ln(1 / (1 - c)) to this power, for warps of people.

@@ -11,8 +11,6 @@ from scipy.sparse.csgraph import connected_components
 from .sizes import BATCH_NUMBERS, CONSTANT
 from .warps import even_slices
 
-__all__ = ["Unit"]
-
 # Features that differ by less than this share of their energy are copies: the rest is rounding.
 _COPY = 2.0**-30
 

@@ -7,8 +7,6 @@ import numpy as np
 
 from .sizes import BATCH
 
-__all__ = ["at_times", "evaluate_warps", "even_slices", "normalise", "sample"]
-
 
 def normalise(arrays, n_frames, subframes=1):
     """Linear time normalisation of sequences to a common number of frames (Eq. 7).

@@ -65,8 +65,6 @@ from .training import (
     with_confidence,
 )
 
-__all__ = ["AnchoredSynchronizer", "Synchronizer"]
-
 
 class Synchronizer(
     DocumentedMixin, LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, BaseEstimator

@@ -26,8 +26,6 @@ from ..matching.sizes import EQUAL
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
 
-__all__ = ["blend_trials"]
-
 # Smallest pace of an extrapolated blend, by that of the slowest trial.
 _SLOWEST = 0.5
 # Largest number of frames of a blend, by that of the longest trial.

@@ -39,8 +39,6 @@ from .learning import (
 from .match import Match
 from .training import check_pattern, draw_sample, pattern_of
 
-__all__ = ["DenseSynchronizer"]
-
 
 class DenseSynchronizer(AnchoredSynchronizer):
     """Align trials in time: warp all of them to the most typical one.

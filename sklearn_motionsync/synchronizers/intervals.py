@@ -14,8 +14,6 @@ from ..matching.uncertainty import coverage_factor
 from ..matching.warps import even_slices
 from ..utils.parallel import one_blas_thread
 
-__all__ = ["Intervals", "calibrated_factor", "intervals_of", "joined"]
-
 # A trial is doubtful if the share of its movement that no path explains, times the widest
 # interval of 90 %, as a share of the clip, is larger: docs/design.md.
 _DOUBTFUL = 0.2

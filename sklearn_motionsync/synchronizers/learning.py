@@ -34,16 +34,6 @@ from ..matching.warps import even_slices, sample
 from ..utils.parallel import one_blas_thread, run
 from .training import known_whole, warn_of_one_feature
 
-__all__ = [
-    "MOST_LEARNT",
-    "SynchronizationWarning",
-    "finish_warps",
-    "learn_metric",
-    "let_exemplars_vote",
-    "match_pairs",
-    "warp_in_portions",
-]
-
 # max_offset="auto". A wide band leads paths astray without a learnt metric; with one, gestures
 # need it: docs/design.md.
 _NARROW, _WIDE = 0.25, 0.4

@@ -13,8 +13,6 @@ from .base import AnchoredSynchronizer
 from .match import Match
 from .training import check_pattern
 
-__all__ = ["LinearSynchronizer"]
-
 
 class LinearSynchronizer(AnchoredSynchronizer):
     """Linear normalisation (Eq. 7): the same number of frames, no matching.

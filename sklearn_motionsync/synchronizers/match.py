@@ -32,17 +32,6 @@ from ..matching.warps import sample
 from ..utils.pipelines import Routed, route_to_synchronizer
 from .intervals import Intervals
 
-__all__ = [
-    "STANDARD",
-    "UNITS",
-    "Match",
-    "check_coverage",
-    "check_match",
-    "check_unit",
-    "match_of_times",
-    "timing_table",
-]
-
 # Coverage of one standard error to both sides, of a normal distribution.
 STANDARD = 0.6827
 # Units of time of the clock of the pattern, and their symbols.

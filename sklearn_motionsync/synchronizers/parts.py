@@ -41,8 +41,6 @@ from .dense import DenseSynchronizer
 from .learning import MOST_LEARNT, warp_in_portions
 from .match import Match, timing_table
 
-__all__ = ["Lags", "PartSynchronizer"]
-
 # What is in no part; no part may have this name.
 _REST = "rest"
 # Fitted attributes of the synchronizer of the whole body that are also those of the parts.

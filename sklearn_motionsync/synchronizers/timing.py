@@ -27,8 +27,6 @@ from .dense import DenseSynchronizer
 from .match import STANDARD, UNITS, Match, check_match
 from .parts import PartSynchronizer
 
-__all__ = ["TimingChannel"]
-
 # The appended features: the offset, and its standard errors.
 _OFFSET, _ERROR = "offset", "offset_error"
 # Synchronizers whose matches tell how sure they are.

@@ -26,24 +26,6 @@ from ..matching.sizes import BATCH, EQUAL
 from ..matching.units import Unit
 from ..matching.warps import even_slices, normalise
 
-__all__ = [
-    "CommonClock",
-    "Pattern",
-    "TrainingSet",
-    "check_fill",
-    "check_pattern",
-    "draw_sample",
-    "fill_trials",
-    "fill_warped",
-    "hold_gaps",
-    "known_whole",
-    "learn_filler",
-    "pattern_of",
-    "put_on_clock",
-    "warn_of_one_feature",
-    "with_confidence",
-]
-
 # Most bytes of a training set on the clock; a fit holds several copies.
 MOST_BYTES = 4 * 2**30
 # Most trials in ``examples_``.

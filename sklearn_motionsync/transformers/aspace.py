@@ -28,8 +28,6 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 
-__all__ = ["ASpace"]
-
 
 class ASpace(
     DocumentedMixin,

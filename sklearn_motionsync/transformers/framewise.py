@@ -27,8 +27,6 @@ from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from ..utils.pipelines import takes_gaps
 
-__all__ = ["FrameWise"]
-
 
 def _goes_back(self):
     """Whether the transformer inverts; fit tries, as some do so with some settings only."""
