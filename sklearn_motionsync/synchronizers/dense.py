@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from numbers import Integral, Real
 from typing import Any, Literal, Self
 
@@ -24,7 +25,9 @@ from ..inputs.validation import names_of_input
 from ..matching.anchors import add_ramps, pin
 from ..matching.costs import COSTS
 from ..matching.gaps import add_weights
+from ..matching.refinement import Refiner
 from ..matching.sharpening import Sharpener
+from ..matching.sizes import BATCH_NUMBERS
 from ..matching.warps import normalise
 from ..utils.parallel import one_blas_thread
 from .base import AnchoredSynchronizer
@@ -362,7 +365,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
             )
             # 3. All pairs are matched (Eqs. 12-17), if the pattern or the exemplars need that.
             needed = isinstance(pattern, str) or 0 < self.consensus < len(trials)
-            pairs = match_pairs(
+            matcher, median = match_pairs(
                 clock,
                 compared,
                 needed,
@@ -373,13 +376,13 @@ class DenseSynchronizer(AnchoredSynchronizer):
                 progress=progress,
             )
             # 4. The trial with the smallest sum of distances is the pattern (Eq. 19).
-            chosen = pattern_of(training, pattern, pairs.median)
+            chosen = pattern_of(training, pattern, median)
             # 5. Exemplars vote.
-            vote = let_exemplars_vote(clock, training, chosen, pairs, self.consensus)
+            vote = let_exemplars_vote(clock, training, chosen, matcher, median, self.consensus)
             # 6. Warps are sharpened or refined.
-            final = finish_warps(clock, training, chosen, vote, self.refine)
+            warper, unexplained = finish_warps(clock, training, chosen, vote, self.refine)
         numbers = np.array(trials.numbers)
-        features, finish = pairs.matcher.features, final.warper.finish
+        features = matcher.features
         distances = np.full(training.population, np.nan)
         distances[numbers] = chosen.distances
         metric, keyframes = compared.metric, vote.keyframes
@@ -391,19 +394,19 @@ class DenseSynchronizer(AnchoredSynchronizer):
             "sample_": numbers,
             "metric_": metric and Bunch(**metric | {"trials": numbers[metric.trials]}),
             "evidence_": compared.evidence,
-            "mu_": float(features.back(pairs.matcher.trellis.mu)),
+            "mu_": float(features.back(matcher.trellis.mu)),
             "exemplars_": numbers[vote.exemplars],
             "keyframes_": None if keyframes is None else keyframes * (clock.n_frames - 1),
-            "unexplained_variance_": final.unexplained,
-            "refines_": final.refines,
-            "sharpening_": _described(finish, clock.poses.shape[2]),
+            "unexplained_variance_": unexplained,
+            "refines_": isinstance(warper.finish, Refiner),
+            "sharpening_": _described(warper.finish, clock.poses.shape[2]),
             "interval_factor_": 1.0,
             "lengths_": clock.lengths,
             "examples_": clock.examples,
             "features_": features.replace(anchors=None, weighs=False),
             "_filler": training.filler,
             "_settings": compared.settings,
-            "_warper": final.warper,
+            "_warper": warper,
         }
 
     def _match(self, trials, keyframes=None, frame_rate=None):
@@ -513,17 +516,28 @@ class DenseSynchronizer(AnchoredSynchronizer):
                 f"trial={trial} is out of range: there are {len(trials)} "
                 f"trials, 0 to {len(trials) - 1}."
             )
-        warper = self._warper
+        warper, features = self._warper, self._warper.matcher.features
         arrays, _ = self._for_warper(trials, **self._given(X, keyframes, frame_rate))
-        positions = warper.positions([arrays[trial]])
-        frames, offsets, costs, path = warper.disparity_space(positions)
-        costs = warper.matcher.features.back(costs)
-        return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
+        moving = features(warper.positions([arrays[trial]]))
+        trellis, base = warper.matcher.trellis, warper.bases.sequences[0]
+        lows, highs = map(np.array, trellis.windows(len(base)))
+        every = math.ceil(math.sqrt(len(base) * (2 * trellis.width + 1) / BATCH_NUMBERS))
+        frames, reach = np.arange(0, len(base), every), trellis.width // every
+        offsets = every * np.arange(-reach, reach + 1)
+        costs = np.full((len(frames), len(offsets)), np.nan)
+        for row, p in zip(costs, frames, strict=True):
+            inside = (lows[p] <= offsets) & (offsets <= highs[p])
+            window = moving[0, p + offsets[inside]]
+            squares = np.square((base[p] - window)[..., trellis.plain]).sum(axis=1)
+            row[inside] = trellis.weighed(squares, base[p], window)
+        path = trellis.paths(base[np.newaxis], moving)[0, 0]
+        return Bunch(frames=frames, offsets=offsets, costs=features.back(costs), path=path)
 
 
 def _described(finish, n_features):
     """What sharpens warps, as ``sharpening_``; None if nothing does."""
     if not isinstance(finish, Sharpener):
         return None
-    agreement = finish.agreement_of_all(n_features)
+    agreement = np.full(n_features, np.nan)
+    agreement[finish.features] = finish.agreement
     return Bunch(agreement=agreement, width=finish.width, trust=finish.trust)
