@@ -374,7 +374,11 @@ class Match:
             labels = self.facts_of(X, frame_rate).index
         if coverage is not None:
             columns["lower"], columns["upper"] = self.interval(coverage, unit, X, frame_rate)
-        table = timing_table(columns, labels)
+        tables = [
+            pd.DataFrame(np.column_stack(of_trial), columns=list(columns))
+            for of_trial in zip(*columns.values(), strict=True)
+        ]
+        table = to_frame(tables, trials=labels)
         if coverage is not None:
             table["doubtful"] = np.repeat(self.doubtful, self.times.shape[1])
         return table
@@ -630,24 +634,3 @@ def check_unit(unit):
     if not (isinstance(unit, str) and unit in UNITS):
         raise ValueError(f"unit must be one of {list(UNITS)}, got {reprlib.repr(unit)}.")
     return unit
-
-
-def timing_table(columns, index=None):
-    """A table indexed by trial and frame of the pattern.
-
-    Parameters
-    ----------
-    columns : dict of ndarray, shape (n_sequences, P)
-        By name.
-    index : sequence of length n_sequences, or Index, default=None
-        Labels of the trials; by default 0, 1, ...
-
-    Returns
-    -------
-    DataFrame
-    """
-    tables = [
-        pd.DataFrame(np.column_stack(of_one), columns=list(columns))
-        for of_one in zip(*columns.values(), strict=True)
-    ]
-    return to_frame(tables, trials=index)

@@ -39,7 +39,7 @@ from ..utils.parameters import validated_with_nested
 from .base import AnchoredSynchronizer
 from .dense import DenseSynchronizer
 from .learning import MOST_LEARNT, warp_in_portions
-from .match import Match, timing_table
+from .match import Match
 
 # What is in no part; no part may have this name.
 _REST = "rest"
@@ -288,7 +288,7 @@ class PartSynchronizer(AnchoredSynchronizer):
             for name in self.parts_
         ]
         values = np.stack(lags, axis=1)
-        return Lags(values, [*self.parts_], unit, groups, people, trials.labels)
+        return Lags(values, [*self.parts_], unit, groups, people)
 
     def _warped(self, trials, match):
         out = match.warp(trials)
@@ -464,8 +464,6 @@ class Lags(NamedTuple):
         The subject of every trial, counted from 0.
     people : list, default=None
         Labels of the subjects.
-    labels : list, default=None
-        Labels of the trials.
 
     Examples
     --------
@@ -492,7 +490,6 @@ class Lags(NamedTuple):
     unit: Unit
     groups: np.ndarray | None = None
     people: list | None = None
-    labels: list | None = None
 
     def summary(self) -> pd.DataFrame:
         """The mean lag of a trial over the clock, and its spread, part by part.
@@ -523,17 +520,6 @@ class Lags(NamedTuple):
         index = pd.MultiIndex.from_product([self.parts, range(n_frames)], names=["part", "frame"])
         columns = self._spread(self.values.reshape(len(self.values), -1))
         return pd.DataFrame(columns, index=index)
-
-    def to_frame(self) -> pd.DataFrame:
-        """All lags as a table, such as for a CSV file.
-
-        Returns
-        -------
-        DataFrame
-            A row a trial and frame of the pattern, a column a part.
-        """
-        columns = {part: self.values[:, i] for i, part in enumerate(self.parts)}
-        return timing_table(columns, self.labels)
 
     def __repr__(self):
         n_sequences, n_parts, n_frames = self.values.shape

@@ -74,9 +74,6 @@ class ASpace(
         The variance left out of each feature; the sum is ``eps_b``.
     missing_ : ndarray, shape (n_features,)
         The share of the training poses in which a feature was missing (NaN).
-    correlation_time_ : float
-        Frames after which the correlation of poses with later ones has fallen to 1/e. 0 after a fit
-        on rows, which have no order.
     n_features_in_ : int
         Features of a pose.
     feature_names_in_ : ndarray of str
@@ -97,10 +94,10 @@ class ASpace(
     it, and the covariance of two over those that show both. ``transform`` interpolates short gaps
     over time, those of one frame at least, and projects the conditional expectation of a pose given
     all that was seen of its trial. There poses are normal, and over time they are autoregressions
-    of second order: they forget their values in ``correlation_time_``, and their velocities in a
-    time of their own. So a hidden arm follows the other limbs, and joins smoothly the frames before
-    and after the gap. Features that predict others are taken to have noise, a fifth of their
-    variance, as few people show them together.
+    of second order: they forget their values in one time, and their velocities in another. So a
+    hidden arm follows the other limbs, and joins smoothly the frames before and after the gap.
+    Features that predict others are taken to have noise, a fifth of their variance, as few people
+    show them together.
     Rows of a 2-D array are poses without order, each expected by itself. A pose of which nothing
     was seen becomes NaN.
 
@@ -193,7 +190,6 @@ class ASpace(
         self.n_components_ = b
         self.missing_ = missing
         self._filler = filler
-        self.correlation_time_ = filler.times[0]
         return self
 
     def transform(self, X: TrialsLike) -> Transformed:
