@@ -90,8 +90,6 @@ def step_table(cost="pose", max_rate=2, subframes=1):
     -------
     StepTable
     """
-    if cost not in COSTS:
-        raise ValueError(f"cost={cost!r} is unknown; use one of {', '.join(map(repr, COSTS))}.")
     steps = np.arange(whole(max_rate * subframes, "down") + 1)
     steps = steps[np.argsort(np.abs(steps - subframes), kind="stable")]
     return StepTable(steps, *COSTS[cost].weights(steps / subframes), subframes)

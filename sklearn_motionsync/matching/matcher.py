@@ -442,10 +442,6 @@ class Warper:
         disparities = trellis.paths(self.bases.sequences[:1], moving)
         return smooth_warps(times_of(disparities)[0], trellis.reach, self.smoothing)
 
-    def exemplar_warps(self):
-        """Smoothed warps of the exemplars: (n_exemplars, P)."""
-        return smooth_warps(self.to_exemplars, self.matcher.trellis.reach, self.smoothing)
-
     def uncertainty(self, positions, times):
         """The `Uncertainty` of the warps of trials.
 

@@ -14,7 +14,7 @@ from sklearn.utils import Bunch, check_random_state
 
 from ..inputs.wording import counted
 from ..matching.anchors import add_ramps, first_meeting
-from ..matching.consensus import choose_exemplars
+from ..matching.consensus import choose_exemplars, smooth_warps
 from ..matching.costs import COSTS
 from ..matching.filters import FINE_SMOOTHING, SMOOTHING, noise_width, white_noise
 from ..matching.gaps import add_weights
@@ -305,7 +305,8 @@ def finish_warps(clock, training, pattern, vote, refine):
         # Poses need three quarters of the smoothing that velocities do: docs/design.md.
         finish = Refiner.of(warper.pattern, 0.75 * noise_width(poses))
     elif features.metric is not None and len(exemplars):
-        times = warper.exemplar_warps()
+        reach = warper.matcher.trellis.reach
+        times = smooth_warps(warper.to_exemplars, reach, warper.smoothing)
         finish = Sharpener.learn(features.metric, warper.pattern, exemplars, times)
     return replace(warper, finish=finish), unexplained
 
@@ -434,25 +435,14 @@ def sums_in_portions(matcher, positions, references, compared, *, n_jobs, progre
     slices = even_slices(n_trials, size)
     name = f"comparing {n_trials} with {counted(n_references, 'trial')}"
     step = progress.stage(name, len(slices))
-    if n_trials == n_references:
-        # The features of all trials are there.
-        portions = [(matcher, compared[rows], compared) for rows in slices]
-        blocks = run(_sums, portions, n_jobs=n_jobs, prefer="threads", step=step)
-    else:
-        common = matcher, positions, compared
-        portions = [(rows,) for rows in slices]
-        blocks = run(
-            _sums_of_rows, portions, common=common, n_jobs=n_jobs, prefer="threads", step=step
-        )
+    common, portions = (matcher, positions, compared), [(rows,) for rows in slices]
+    blocks = run(_sums, portions, common=common, n_jobs=n_jobs, prefer="threads", step=step)
     return np.concatenate(list(blocks))
 
 
-def _sums(matcher, bases, references):
-    return matcher.trellis.distances(bases, references).sum(axis=1, dtype=np.float64)
-
-
-def _sums_of_rows(matcher, positions, references, rows):
-    return _sums(matcher, matcher.features(positions[rows]), references)
+def _sums(matcher, positions, references, rows):
+    distances = matcher.trellis.distances(matcher.features(positions[rows]), references)
+    return distances.sum(axis=1, dtype=np.float64)
 
 
 def warp_in_portions(warper, arrays, body_times=None, *, n_jobs, begin, name):

@@ -211,7 +211,11 @@ class ASpace(
         components, timed = self.components_.T, trials.kind != "rows"
         arrays = []
         for a in trials:
-            whole = self._filled(a, timed) if is_gappy(a) else a
+            whole = a
+            if is_gappy(a):
+                whole = self._filler.expect(a, timed)
+                # Poses of which nothing was seen stay as they are.
+                whole[np.isnan(a).all(axis=1)] = np.nan
             arrays.append(((whole - self.mean_) @ components).astype(a.dtype, copy=False))
         return restore(self, trials, arrays)
 
@@ -261,12 +265,6 @@ class ASpace(
     @property
     def _n_features_out(self):
         return self.n_components_
-
-    def _filled(self, array, timed):
-        """An array without gaps, but for poses of which nothing was seen."""
-        whole = self._filler.expect(array, timed)
-        whole[np.isnan(array).all(axis=1)] = np.nan
-        return whole
 
     def _check_seen(self, hidden):
         """Refuse features that were never seen, by what is hidden (n_poses, n_features)."""

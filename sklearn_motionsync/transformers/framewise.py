@@ -210,10 +210,6 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstim
 
     # -- frames to the transformer, and back ------------------------------------------------
 
-    @property
-    def _name(self):
-        return type(self.transformer).__name__
-
     def _finite(self):
         """What the input must be: NaN is allowed if the transformer accepts it."""
         return "allow-nan" if takes_gaps(self.transformer) else True
@@ -228,15 +224,16 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstim
     def _as_rows(self, rows, trials, i):
         """The output of the transformer for a trial, checked: a row of numbers a frame."""
         what, n_frames = trials.called(i), len(trials[i])
+        name = type(self.transformer).__name__
         if issparse(rows):
             raise TypeError(
-                f"{self._name} gives a sparse matrix, and frames are arrays: let it give arrays, "
+                f"{name} gives a sparse matrix, and frames are arrays: let it give arrays, "
                 "as by sparse_output=False, or sparse_threshold=0 of a ColumnTransformer."
             )
-        rows = as_numbers(rows, f"{what}, transformed by {self._name},")
+        rows = as_numbers(rows, f"{what}, transformed by {name},")
         if rows.ndim != 2 or len(rows) != n_frames:
             raise ValueError(
-                f"{what} has {n_frames} frames, of which {self._name} made the shape {rows.shape}: "
+                f"{what} has {n_frames} frames, of which {name} made the shape {rows.shape}: "
                 "in FrameWise a transformer gives one row a frame. What changes the number of "
                 "frames is applied before, [change(x) for x in X]."
             )

@@ -55,11 +55,6 @@ def test_features_equal_oracle(cost, pace, smoothing):
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
-def test_step_table_refuses_unknown_cost():
-    with pytest.raises(ValueError, match=r"cost='dtw' is unknown; use one of .*'pose'"):
-        step_table("dtw")
-
-
 @pytest.mark.parametrize(
     ("max_rate", "subframes"), [(1, 1), (1.9, 1), (1.4, 2), (1.5, 2), (2.9, 3), (3.5, 4)]
 )
