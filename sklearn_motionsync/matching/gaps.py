@@ -70,8 +70,12 @@ def interpolate_gaps(values, longest=np.inf, times=None, held=False, straight=Fa
         rows, after = rows[inside], after[inside]
         rows = rows[times[at[after]] - times[at[after - 1]] <= longest + 1]
         if len(rows):
-            known = out[np.ix_(at, columns)]
-            out[np.ix_(rows, columns)] = _along(times[at], known, times[rows], straight)
+            known, wanted = out[np.ix_(at, columns)], np.ix_(rows, columns)
+            if straight or len(at) < 3:
+                lines = [np.interp(times[rows], times[at], values) for values in known.T]
+                out[wanted] = np.column_stack(lines)
+            else:
+                out[wanted] = Akima1DInterpolator(times[at], known)(times[rows])
     return out
 
 
@@ -196,7 +200,12 @@ class Filler(NamedTuple):
         hidden = np.isnan(array)
         unknown = np.where(hidden, 0, 1 - confidence)
         bands = _time_precision(len(array), *self.times)
-        for (first, end), columns in _gaps_of(hidden).items():
+        # The features of every gap, by its first frame and the one after its last.
+        gaps = {}
+        for column in np.flatnonzero(hidden.any(axis=0)).tolist():
+            for first, end in runs_of(hidden[:, column]).tolist():
+                gaps.setdefault((first, end), []).append(column)
+        for (first, end), columns in gaps.items():
             unknown[first:end, columns] = _unknown_step(bands, first, end)
         for mask in np.unique(hidden[hidden.any(axis=1)], axis=0):
             rows = (hidden == mask).all(axis=1)
@@ -260,22 +269,6 @@ def add_weights(arrays, weights):
         weights = [np.ones(len(x)) for x in arrays]
     columns = (w[:, np.newaxis].astype(x.dtype) for x, w in zip(arrays, weights, strict=True))
     return [np.concatenate([x, w], axis=1) for x, w in zip(arrays, columns, strict=True)]
-
-
-def _along(times, values, at, straight):
-    """Values (n_times, n_columns) at times between them."""
-    if straight or len(times) < 3:
-        return np.column_stack([np.interp(at, times, y) for y in values.T])
-    return Akima1DInterpolator(times, values)(at)
-
-
-def _gaps_of(hidden):
-    """The features of every gap, by its first frame and the one after its last."""
-    gaps = {}
-    for column in np.flatnonzero(hidden.any(axis=0)).tolist():
-        for first, end in runs_of(hidden[:, column]).tolist():
-            gaps.setdefault((first, end), []).append(column)
-    return gaps
 
 
 def _correlation_time(arrays):

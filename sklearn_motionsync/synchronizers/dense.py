@@ -22,8 +22,10 @@ from ..inputs.types import (
     ValuesLike,
 )
 from ..inputs.validation import names_of_input
-from ..matching.anchors import add_ramps, pin
+from ..inputs.wording import counted
+from ..matching.anchors import add_ramps, first_meeting, pin
 from ..matching.costs import COSTS
+from ..matching.counting import whole
 from ..matching.gaps import add_weights
 from ..matching.refinement import Refiner
 from ..matching.sharpening import Sharpener
@@ -31,7 +33,7 @@ from ..matching.sizes import BATCH_NUMBERS
 from ..matching.warps import normalise
 from ..utils.parallel import one_blas_thread
 from .base import AnchoredSynchronizer
-from .intervals import calibrated_factor, intervals_of
+from .intervals import intervals_of
 from .learning import (
     finish_warps,
     learn_metric,
@@ -458,9 +460,28 @@ class DenseSynchronizer(AnchoredSynchronizer):
         trials = self.check_trials(X)
         keyframe_rows = Keyframes(keyframes, len(trials), frame_rate)
         count = None if self.keyframes_ is None else len(self.keyframes_)
-        frames = keyframe_rows.shares(trials, count) * (self.n_frames_ - 1)
-        match = self._match(trials)
-        self.interval_factor_ *= calibrated_factor(match, self.keyframes_, frames)
+        # In frames of the clock; NaN where one is not known.
+        known = keyframe_rows.shares(trials, count) * (self.n_frames_ - 1)
+        match, frames, seen = self._match(trials), np.arange(self.n_frames_), np.isfinite(known)
+        of_pattern = self.keyframes_
+        if of_pattern is None:
+            of_pattern = np.nanmedian(first_meeting(match.times, known), axis=0)
+
+        def at_keyframes(curves):
+            return np.array([np.interp(of_pattern, frames, curve) for curve in curves])[seen]
+
+        errors = np.abs(at_keyframes(match.times) - known[seen])
+        widths = at_keyframes(match.intervals.measured().widths)
+        # As many as hold 90 % of new ones, too (split conformal prediction).
+        n = len(errors)
+        rank = whole(0.9 * (n + 1), "up")
+        if rank > n:
+            raise ValueError(
+                f"{counted(n, 'key-frame')} of the trials do not tell 90 %: at least 9 are "
+                "needed, and some dozens tell it well."
+            )
+        factors = errors / np.maximum(widths, np.finfo(np.float64).tiny)
+        self.interval_factor_ *= float(np.sort(factors)[rank - 1])
         return self
 
     def _for_warper(self, trials, keyframes=None, frame_rate=None):
@@ -510,8 +531,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
             If there is no such trial.
         """
         trials = self.check_trials(X)
-        whole = isinstance(trial, Integral) and not isinstance(trial, bool)
-        if not whole or not 0 <= trial < len(trials):
+        is_index = isinstance(trial, Integral) and not isinstance(trial, bool)
+        if not is_index or not 0 <= trial < len(trials):
             raise ValueError(
                 f"trial={trial} is out of range: there are {len(trials)} "
                 f"trials, 0 to {len(trials) - 1}."

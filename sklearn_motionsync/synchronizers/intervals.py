@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..inputs.wording import counted
-from ..matching.anchors import first_meeting
 from ..matching.counting import whole
 from ..matching.sizes import BATCH
 from ..matching.uncertainty import coverage_factor
@@ -124,42 +122,6 @@ def intervals_of(warper, arrays, times, factor, evidence, pinned=None):
         return Measured(widths * factor, is_normal, _reasons(unlike, widest, evidence))
 
     return Intervals(times, measure)
-
-
-def calibrated_factor(match, pattern, known):
-    """By what the half-widths of a match have to be multiplied, so that they hold key-frames.
-
-    Parameters
-    ----------
-    match : Match
-        Of trials, without their key-frames.
-    pattern : ndarray, shape (n_keyframes,), or None
-        Key-frames of the pattern, in frames; None for the median of what trials meet.
-    known : ndarray, shape (n_sequences, n_keyframes)
-        In frames of the clock; NaN where one is not known.
-
-    Returns
-    -------
-    float
-    """
-    if pattern is None:
-        pattern = np.nanmedian(first_meeting(match.times, known), axis=0)
-    frames, seen = np.arange(match.times.shape[1]), np.isfinite(known)
-
-    def at_keyframes(curves):
-        return np.array([np.interp(pattern, frames, curve) for curve in curves])[seen]
-
-    errors = np.abs(at_keyframes(match.times) - known[seen])
-    widths = np.maximum(at_keyframes(match.intervals.measured().widths), np.finfo(np.float64).tiny)
-    # As many as hold 90 % of new ones, too (split conformal prediction).
-    n = len(errors)
-    rank = whole(0.9 * (n + 1), "up")
-    if rank > n:
-        raise ValueError(
-            f"{counted(n, 'key-frame')} of the trials do not tell 90 %: at least 9 are "
-            "needed, and some dozens tell it well."
-        )
-    return float(np.sort(errors / widths)[rank - 1])
 
 
 def _reasons(shares, widest, evidence):

@@ -76,7 +76,14 @@ def draw_sample(X, size, pattern, random_state):
     """
     if size is None:
         return X, None, None
-    collection = _indexable(as_pandas(X))
+    X = as_pandas(X)
+    # Trials, or rows, by index; None for input that has to be refused.
+    collection = as_source(X)
+    if isinstance(X, pd.DataFrame):
+        collection = X if X.index.nlevels == 1 else as_collection(X)
+    elif collection is None:
+        is_sequence = isinstance(X, (list, tuple)) or (isinstance(X, np.ndarray) and X.ndim > 0)
+        collection = X if is_sequence or gives_rows(X) else None
     population = 0 if collection is None else count_of(collection)
     is_index = isinstance(pattern, Integral) and not isinstance(pattern, bool)
     if size >= population or (is_index and pattern >= population):
@@ -86,17 +93,6 @@ def draw_sample(X, size, pattern, random_state):
         drawn = np.concatenate([[pattern], drawn[drawn != pattern]])
     numbers = np.sort(drawn[:size])
     return select(collection, numbers), numbers.tolist(), population
-
-
-def _indexable(X):
-    """Trials, or rows, by index; None for input that has to be refused."""
-    source = as_source(X)
-    if source is not None:
-        return source
-    if isinstance(X, pd.DataFrame):
-        return X if X.index.nlevels == 1 else as_collection(X)
-    is_sequence = isinstance(X, (list, tuple)) or (isinstance(X, np.ndarray) and X.ndim > 0)
-    return X if is_sequence or gives_rows(X) else None
 
 
 # -- the clock, and the pattern on it ---------------------------------------------------------
