@@ -145,7 +145,14 @@ def blend_trials(
     timing = weights if timing is None else _weights(timing, labels, n_frames, "timing")
     frames, at = _blend_pace(warps, timing)
     weights = np.stack([np.interp(at, np.arange(n_frames), w) for w in weights.T])
-    out = _blend(arrays, frames, weights, skeleton).astype(arrays[0].dtype, copy=False)
+    # Those of other weights than 0.
+    used = np.flatnonzero(weights.any(axis=1))
+    chosen = [arrays[i].astype(np.float64) for i in used]
+    if skeleton is None:
+        out = blend_numbers(chosen, frames[used], weights[used])
+    else:
+        out = blend_bodies(chosen, frames[used], weights[used], skeleton)
+    out = out.astype(arrays[0].dtype, copy=False)
     return out[:, 0] if is_rows else _like(sequences, out, levels[-1], rates)
 
 
@@ -258,16 +265,6 @@ def _blend_pace(warps, timing):
     frames = np.stack([np.interp(at, clock, x) for x in warps])
     exact = np.rint(frames)
     return np.where(np.abs(frames - exact) < ROUNDING * warps.max(), exact, frames), at
-
-
-def _blend(arrays, frames, weights, skeleton):
-    """The blend of trials with weights other than 0, (n_frames, n_features)."""
-    used = weights.any(axis=1)
-    chosen = [x.astype(np.float64) for x, u in zip(arrays, used, strict=True) if u]
-    frames, weights = frames[used], weights[used]
-    if skeleton is None:
-        return blend_numbers(chosen, frames, weights)
-    return blend_bodies(chosen, frames, weights, skeleton)
 
 
 def _like(sequences, array, name, rates):

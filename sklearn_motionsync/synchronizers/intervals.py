@@ -119,25 +119,20 @@ def intervals_of(warper, arrays, times, factor, evidence, pinned=None):
             keyframes, is_known = pinned
             for way in ("down", "up"):
                 widths[:, whole(keyframes, way)] *= ~is_known
-        return Measured(widths * factor, is_normal, _reasons(unlike, widest, evidence))
+        reasons = []
+        for share, width in zip(unlike, widest, strict=True):
+            why = None
+            if share * width > _DOUBTFUL:
+                why = (
+                    f"no warp explains {share:.0%} of its movement, and an interval of 90 % holds "
+                    f"{width:.0%} of the clip: it may be cut off, repeated or another movement"
+                )
+            elif evidence.weak:
+                why = (
+                    f"matching leaves {evidence.remaining:.0%} of the differences in the training "
+                    "set, and its warps contradict each other (evidence_)"
+                )
+            reasons.append(why)
+        return Measured(widths * factor, is_normal, reasons)
 
     return Intervals(times, measure)
-
-
-def _reasons(shares, widest, evidence):
-    """Why trials are doubtful; None for those that are not."""
-    reasons = []
-    for share, width in zip(shares, widest, strict=True):
-        why = None
-        if share * width > _DOUBTFUL:
-            why = (
-                f"no warp explains {share:.0%} of its movement, and an interval of 90 % holds "
-                f"{width:.0%} of the clip: it may be cut off, repeated or another movement"
-            )
-        elif evidence.weak:
-            why = (
-                f"matching leaves {evidence.remaining:.0%} of the differences in the training set, "
-                "and its warps contradict each other (evidence_)"
-            )
-        reasons.append(why)
-    return reasons

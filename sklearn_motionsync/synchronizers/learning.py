@@ -44,6 +44,8 @@ _LEARNING_OFFSET = 0.2
 _FEWEST, MOST_LEARNT = 3, 20
 # Largest rounding, as a share of the smallest global distance, that tells distances apart.
 _LARGEST_ROUNDING = 0.01
+# Most steps of a path at a frame, all offsets together.
+_MOST_STEPS = 1e9
 
 
 # -- step 2: the metric ---------------------------------------------------------------------
@@ -84,7 +86,14 @@ def learn_metric(clock, *, cost, metric, consensus, smoothness, max_offset, max_
     learns = metric == "learned" and cost == "velocity" and consensus > 0
     narrow, wide = (_NARROW, _WIDE) if max_offset == "auto" else (max_offset, max_offset)
     settings = PathSettings(smoothness, wide if learns else narrow, max_rate)
-    refuse_long_paths(settings, clock.n_frames)
+    steps = min(max_rate, clock.n_frames - 1) + 1
+    steps *= 2 * settings.max_offset * clock.n_frames + 1
+    if steps > _MOST_STEPS:
+        raise ValueError(
+            f"max_rate = {max_rate} and max_offset = {settings.max_offset} on {clock.n_frames} "
+            f"frames ask for {steps:.0e} steps of a path at every frame of every pair; "
+            f"{_MOST_STEPS:.0e} is the limit. Use a smaller rate or offset, or fewer frames."
+        )
     smoothing = FINE_SMOOTHING if learns else SMOOTHING
     plain = Features(cost, smoothing, clock.unit, anchors=clock.anchors, weighs=clock.weighs)
     learnt = None
@@ -398,20 +407,6 @@ def weigh_evidence(evidence, n_trials):
 # Sizes of a portion: worth sending to another process, and small enough to share out.
 PORTION_CELLS = 50_000_000
 _PORTION_TRIALS = 256
-# Most steps of a path at a frame, all offsets together.
-_MOST_STEPS = 1e9
-
-
-def refuse_long_paths(settings, n_frames):
-    """Refuse a trellis that takes too long."""
-    steps = min(settings.max_rate, n_frames - 1) + 1
-    steps *= 2 * settings.max_offset * n_frames + 1
-    if steps > _MOST_STEPS:
-        raise ValueError(
-            f"max_rate = {settings.max_rate} and max_offset = {settings.max_offset} on {n_frames} "
-            f"frames ask for {steps:.0e} steps of a path at every frame of every pair; "
-            f"{_MOST_STEPS:.0e} is the limit. Use a smaller rate or offset, or fewer frames."
-        )
 
 
 def sums_in_portions(matcher, positions, references, compared, *, n_jobs, progress):
