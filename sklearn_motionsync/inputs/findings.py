@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,8 @@ import pandas as pd
 
 from .collections import NOT_ONE, as_collection, check_members
 from .columns import CONFIDENCE
-from .numbers import listed
+from .features import choose_features
+from .numbers import as_numbers, listed
 from .types import TrialsLike
 from .wording import counted, within
 
@@ -192,7 +193,11 @@ def check_trials(X: TrialsLike) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns)
 
 
-def mend_trials(X: TrialsLike, kinds: Sequence[str] = ("wrapping", "zeros at the end")) -> list:
+def mend_trials(
+    X: TrialsLike,
+    kinds: Sequence[str] = ("wrapping", "zeros at the end"),
+    period: float | Mapping[str | int, float] | None = None,
+) -> list:
     """Trials without those findings that can be mended without a doubt.
 
     Parameters
@@ -204,6 +209,11 @@ def mend_trials(X: TrialsLike, kinds: Sequence[str] = ("wrapping", "zeros at the
         the first one. ``"quaternion"``: the signs go on within a trial and agree with those of the
         first one. ``"fill value"``: it becomes NaN. ``"zeros at the end"`` and ``"missing at the
         end"``: these frames are left out.
+    period : float, or dict of feature to float, default=None
+        What a turn is in features that are circular, such as 360 of headings in degrees: of all
+        features, or of those that are given by index or name. They are mended as ``"wrapping"``,
+        also where no trial wraps by itself and only some are near the other end. Then they are
+        matched and averaged on the circle.
 
     Returns
     -------
@@ -213,7 +223,7 @@ def mend_trials(X: TrialsLike, kinds: Sequence[str] = ("wrapping", "zeros at the
     Raises
     ------
     ValueError
-        If a kind is none of these.
+        If a kind is none of these, a period is not above 0, or there is no such feature.
 
     Examples
     --------
@@ -231,6 +241,11 @@ def mend_trials(X: TrialsLike, kinds: Sequence[str] = ("wrapping", "zeros at the
             raise ValueError(f"kinds are {list(_MENDERS)}, got {kind!r}.")
     trials, names = _read(X)
     findings = [each for each in _look(trials, names) if each.kind in kinds]
+    if period is not None:
+        periods = _read_period(period, names, trials[0].shape[1])
+        findings = [each for each in findings if each.feature not in periods]
+        for feature, size in periods.items():
+            findings.append(Finding("wrapping", 0, feature, 0, 0, 0.0, facts={"period": size}))
     # A fill value is hidden before anything is compared, and padding is cut off at last.
     findings.sort(key=lambda each: list(_MENDERS).index(each.kind))
     arrays = [np.array(x) if findings else x for x in trials]
@@ -243,6 +258,18 @@ def mend_trials(X: TrialsLike, kinds: Sequence[str] = ("wrapping", "zeros at the
         else x
         for x, old in zip(arrays, given, strict=True)
     ]
+
+
+def _read_period(period, names, n_features):
+    """The period of each circular feature, by index."""
+    names = [f"x{k}" for k in range(n_features)] if names is None else list(names)
+    if not isinstance(period, Mapping):
+        period = dict.fromkeys(range(n_features), period)
+    sizes = as_numbers(list(period.values()), "The periods", dtype=np.float64)
+    if not (sizes > 0).all() or not np.isfinite(sizes).all():
+        raise ValueError(f"period must be above 0, such as 360 of degrees; got {period!r}.")
+    indices = choose_features(list(period), names)
+    return dict(zip(indices, sizes.tolist(), strict=True))
 
 
 def warn_of_findings(trials, names, *, clocks=True):

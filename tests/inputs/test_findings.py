@@ -226,3 +226,30 @@ def test_tables_stay_tables_with_their_attrs():
         mend_trials(tables, "all")
     with pytest.raises(ValueError, match="Wrap one trial as"):
         check_trials(np.zeros((9, 3)))
+
+
+def test_circular_features_that_are_named_are_averaged_on_the_circle():
+    """Headings near half a turn, some on either side of it, of which none wraps by itself."""
+    t = np.linspace(0, 1, 60)[:, np.newaxis]
+    rng = np.random.default_rng(0)
+    headings = [179 + 4 * rng.standard_normal() + np.sin(3 * t) for _ in range(8)]
+    trials = [np.hstack([(h + 180) % 360 - 180, np.cos(5 * t)]) for h in headings]
+    trials = [x for x in trials if np.abs(np.diff(x[:, 0])).max() < 10]
+    starts = np.array([x[0, 0] for x in trials])
+    assert starts.min() < 0 < starts.max()
+    assert len(check_trials(trials)) == 0
+    circular = np.angle(np.mean([np.exp(1j * np.radians(x[:, 0])) for x in trials], axis=0))
+    for period in ({0: 360}, {"x0": 360.0}):
+        mended = mend_trials(trials, period=period)
+        mean = np.radians(np.mean([x[:, 0] for x in mended], axis=0))
+        np.testing.assert_allclose(np.exp(1j * mean), np.exp(1j * circular), atol=2e-3)
+        # Other features stay, and those with another period are of another kind.
+        for old, new in zip(trials, mended, strict=True):
+            np.testing.assert_array_equal(new[:, 1], old[:, 1])
+    everything = mend_trials([x[:, :1] for x in trials], period=360)
+    np.testing.assert_allclose([x[:, 0] for x in everything], [x[:, 0] for x in mended])
+    for bad in (0, -360, np.inf, {0: 0}):
+        with pytest.raises(ValueError, match="period must be above 0"):
+            mend_trials(trials, period=bad)
+    with pytest.raises(ValueError, match="There is no feature 'yaw'"):
+        mend_trials(trials, period={"yaw": 360})
