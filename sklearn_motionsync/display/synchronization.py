@@ -217,6 +217,11 @@ class SynchronizationDisplay(Display):
         return super().plot(ax)
 
     @property
+    def times(self) -> np.ndarray:
+        """The times of the match, (n_sequences, P), in frames."""
+        return self.match.times
+
+    @property
     def doubtful(self) -> np.ndarray | None:
         """Which trials are doubtful; None if the match does not tell."""
         return None if self.match.intervals is None else self.match.doubtful

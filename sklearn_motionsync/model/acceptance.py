@@ -10,7 +10,7 @@ from ..utils.groups import mean_of_others
 
 # Variance of the logarithm over trials of one action (16 actions of people); it weighs as
 # much as that of so many trials. That of a dissimilarity is the mean over 21 actions.
-_PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
+_PRIOR_VARIANCE, PRIOR_COUNT = 0.07, 3
 DISSIMILARITY_VARIANCE = 0.12
 # Smaller dissimilarities, and energies as a share of the total variance, are rounding.
 LEAST = 1e-9
@@ -69,8 +69,8 @@ class LogMoments:
 
     def standardize(self, values, prior_variance=_PRIOR_VARIANCE):
         """Deviations of the logarithms of values from the mean, in standard deviations."""
-        squares = self.squares + _PRIOR_COUNT * prior_variance
-        return (np.log(values) - self.mean) / np.sqrt(squares / (self.n + _PRIOR_COUNT))
+        squares = self.squares + PRIOR_COUNT * prior_variance
+        return (np.log(values) - self.mean) / np.sqrt(squares / (self.n + PRIOR_COUNT))
 
 
 def log_moments(dissimilarities):
@@ -102,8 +102,8 @@ def t_prediction_limit(n, squares, coverage, prior_variance=_PRIOR_VARIANCE):
 
 def _prediction(n, squares, prior_variance):
     """Degrees of freedom, and standard error of a new value less the mean."""
-    freedom = n - 1 + _PRIOR_COUNT
-    squares = squares + _PRIOR_COUNT * prior_variance
+    freedom = n - 1 + PRIOR_COUNT
+    squares = squares + PRIOR_COUNT * prior_variance
     return freedom, np.sqrt(squares / freedom * (1 + 1 / n))
 
 
@@ -123,7 +123,7 @@ def dissimilarity_tails(held_out, new=None):
     moments = log_moments(held_out)
     values = np.maximum(held_out if new is None else new, LEAST)
     deviations = moments.standardize(values, DISSIMILARITY_VARIANCE)
-    return _log_tail(deviations / np.sqrt(1 + 1 / moments.n), moments.n - 1 + _PRIOR_COUNT)
+    return _log_tail(deviations / np.sqrt(1 + 1 / moments.n), moments.n - 1 + PRIOR_COUNT)
 
 
 def _log_tail(deviations, freedom):
@@ -217,7 +217,7 @@ class LogPredictionInterval:
         deviations = (logs - mean_of_others(logs, groups)) * np.sqrt((n - 1) / (n + 1))
         squares = np.square(deviations).sum()
         self._half_width = t_prediction_limit(n, squares, (1 + coverage) / 2, prior_variance)
-        self._freedom, self._error = n - 1 + _PRIOR_COUNT, np.sqrt(1 + 1 / n)
+        self._freedom, self._error = n - 1 + PRIOR_COUNT, np.sqrt(1 + 1 / n)
         self.end = student.ppf((1 + coverage) / 2, self._freedom) * self._error
         self.deviations = deviations / self._half_width
         ends = np.exp([self._mean - self._half_width, self._mean + self._half_width])
@@ -273,8 +273,8 @@ class Contrast:
         self._noise = _NOISE * np.square(d - self._mean).sum() / len(d) + least
         held_out = self._contrasts(d, mean_of_others(d, groups))
         self.middle = float(held_out.mean())
-        squares = np.square(held_out - self.middle).sum() + _PRIOR_COUNT * _CONTRAST_VARIANCE
-        std = np.sqrt(squares / (len(d) - 1 + _PRIOR_COUNT))
+        squares = np.square(held_out - self.middle).sum() + PRIOR_COUNT * _CONTRAST_VARIANCE
+        std = np.sqrt(squares / (len(d) - 1 + PRIOR_COUNT))
         changes = np.square(self._mean - self._mean.mean(axis=0))
         is_large = changes.sum() >= _LARGE * moved.sum() / len(d)
         self.is_clear = bool(is_large and self.middle >= _CLEAR * std)

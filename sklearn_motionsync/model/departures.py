@@ -254,8 +254,7 @@ class Judged(NamedTuple):
         is_refused = limit is None and self.refused is not None and bool(self.refused[i])
         if limit is None and self.refused is not None and not is_refused:
             return []
-        # Rows, and how far their evidence is beyond what is rare.
-        rows, evidence = [], []
+        rows = []
         for fault in self.faults[i]:
             row = self._row(i, fault)
             if row is None or not abs(row.deviation) > (limit or 0):
@@ -267,17 +266,16 @@ class Judged(NamedTuple):
             same = [r for r in rows if r.feature == row.feature and r.unit == row.unit]
             if not any(r.first <= row.peak <= r.last for r in same):
                 rows.append(row)
-                evidence.append(min([fault.score / self.rare_score, *evidence[-1:]]))
-        for fault in self.of_whole[i]:
-            # Of one that is backwards, or of another side, limbs tell nothing.
-            is_another = np.isnan(fault.deviation)
-            if is_another or abs(fault.deviation) > (limit or 0):
-                rows.append(self._row_of_whole(i, fault))
-                evidence.append(np.inf if is_another else fault.excess)
-        order = np.argsort(-np.array(evidence), kind="stable")
-        rows = [rows[k] for k in order]
+        of_whole = sorted(self.of_whole[i], key=lambda fault: -fault.excess)
+        rows = [
+            self._row_of_whole(i, fault)
+            for fault in of_whole
+            if np.isnan(fault.deviation) or abs(fault.deviation) > (limit or 0)
+        ] + rows
+        # What is rare comes first, of the whole body before its parts.
+        rows.sort(key=lambda row: not row.rare)
         if is_refused and not rows:
-            another = WholeFault("another movement", 0.0, 1.0, np.nan, "", np.nan, np.nan)
+            another = WholeFault("another movement", 0.0, 1.0, np.nan, "", 1.0, 1.0, np.nan)
             rows = [self._row_of_whole(i, another)]
         return [row._replace(rare=row.rare or is_refused) for row in rows[:_MOST_ROWS]]
 
@@ -291,7 +289,8 @@ class Judged(NamedTuple):
         first, last = (whole(x) for x in np.interp([start, stop], times, frames))
         return Departure(
             i, fault.kind, WHOLE, WHOLE, None, None, first, last, (first + last) // 2,
-            *self._in_recording(i, start, stop), fault.size, fault.unit, fault.deviation, True,
+            *self._in_recording(i, start, stop), fault.size, fault.unit, fault.deviation,
+            fault.rarity > 1,
         )  # fmt: skip
 
     def _in_recording(self, i, start, stop):
@@ -413,7 +412,7 @@ def _of_detector(detector, report):
             if name == "duration":
                 lower, upper = detector.borders_[name]
                 size, unit = float((upper / lower) ** (value / 2)), "ratio"
-            faults[i].append(WholeFault(kind, 0.0, 1.0, size, unit, abs(value), np.nan))
+            faults[i].append(WholeFault(kind, 0.0, 1.0, size, unit, abs(value), np.inf, np.nan))
     return faults
 
 

@@ -3,11 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import t as student
 
 from ..matching.counting import first_largest, runs_of
 from ..matching.filters import smooth
 from ..utils.groups import mean_of_others
-from .acceptance import LogPredictionInterval
+from .acceptance import PRIOR_COUNT, LogPredictionInterval
 
 # Standard deviation of the Gaussian under which speeds are estimated, as a share of the time.
 _SMOOTHING = 0.01
@@ -46,6 +47,8 @@ class WholeFault(NamedTuple):
     unit : str
     excess : float
         In units of the limit: above 1.
+    rarity : float
+        In units of the limit if people are as different as so few can be: above 1 it is rare.
     deviation : float
         In standard deviations of people; NaN where these are not known.
     """
@@ -56,6 +59,7 @@ class WholeFault(NamedTuple):
     size: float
     unit: str
     excess: float
+    rarity: float
     deviation: float
 
 
@@ -94,6 +98,15 @@ class WholeBody:
         }
         amplitudes = np.array([self._amplitude(x) for x in on_clock])
         self._limits["amplitude"] = LogPredictionInterval(amplitudes, groups_on_clock, coverage)
+        # Trials of one person are alike, so a limit is as sure as so few people make it.
+        tail = (1 + coverage) / 2
+        self._few = {
+            name: _limit_of(tail, len(np.unique(of_limit))) / _limit_of(tail, len(of_limit))
+            for name, of_limit in {
+                **dict.fromkeys(("start", "stop", "pause"), groups),
+                "amplitude": groups_on_clock,
+            }.items()
+        }
         differences = on_clock - on_clock[:, ::-1]
         self._difference = differences.mean(axis=0)
         of_others = mean_of_others(differences, groups_on_clock)
@@ -127,13 +140,14 @@ class WholeBody:
                     continue
                 size, unit = ratio, "ratio"
             deviation = excess * limit.end
-            fault = WholeFault(kind, *places[name], size, unit, abs(excess), deviation)
+            rarity = abs(excess) / self._few[name]
+            fault = WholeFault(kind, *places[name], size, unit, abs(excess), rarity, deviation)
             faults.append(fault)
         if self._has_direction:
             contrast = self._direction(on_clock - on_clock[::-1], self._difference)
             if contrast < 0:
                 excess = float(1 - contrast / self._middle)
-                faults.append(WholeFault("backwards", 0.0, 1.0, np.nan, "", excess, np.nan))
+                faults.append(WholeFault("backwards", 0.0, 1.0, np.nan, "", excess, np.inf, np.nan))
         return faults
 
     def _in_time(self, trial):
@@ -178,3 +192,8 @@ class WholeBody:
         products, norms = (difference * mean).sum(axis=0), np.square(mean).sum(axis=0)
         ratios = products / np.where(norms > 0, norms, 1)
         return float(self._weights @ np.clip(ratios, -_MOST_OF_COLUMN, _MOST_OF_COLUMN))
+
+
+def _limit_of(tail, n):
+    """The limit of a new value in standard deviations, by n others."""
+    return student.ppf(tail, n - 1 + PRIOR_COUNT) * np.sqrt(1 + 1 / n)
