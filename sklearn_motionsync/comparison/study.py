@@ -98,8 +98,7 @@ class Study:
                     "for two labels with the same people; otherwise each person has one label."
                 )
         maker = _means(persons)
-        # By the first trial of each person.
-        of_units = codes[np.unique(persons, return_index=True)[1]]
+        of_units = codes[_firsts(persons)]
         counts = np.bincount(of_units)
         if counts.min() < 2:
             of = ", ".join(f"{c} in {name!r}" for c, name in zip(counts, labels, strict=True))
@@ -317,6 +316,11 @@ def _means(persons, in_group=None):
     return belongs / np.maximum(belongs.sum(axis=1, keepdims=True), 1)
 
 
+def _firsts(persons):
+    """The index of the first trial of each person."""
+    return np.unique(persons, return_index=True)[1]
+
+
 def _count_units(n, n_trials, named):
     """What differs: people, or trials of which each counts as a person."""
     if not named:
@@ -368,6 +372,12 @@ class Design:
         rows, triangle = np.linalg.qr(columns)
         self.rows, self.flips = rows * np.sign(np.diagonal(triangle)), flips
         self.left = len(columns) - columns.shape[1] - (not flips)
+
+    def rearranged(self, order):
+        """The same of units in another order."""
+        design = copy(self)
+        design.rows = self.rows[order]
+        return design
 
     def permuted(self, random_state):
         """The rows after one random permutation."""
@@ -494,8 +504,7 @@ def families(design, curves, n_permutations, random_state, *, by=(), n_jobs=None
     list of Family
     """
     order = _order_of_values([curves[0], *by], design.flips)
-    design, curves = copy(design), [values[order] for values in curves]
-    design.rows = design.rows[order]
+    design, curves = design.rearranged(order), [values[order] for values in curves]
     draws = [design.rows, *(design.permuted(random_state) for _ in range(n_permutations))]
     portions = [np.stack(draws[k : k + _BATCH]) for k in range(0, len(draws), _BATCH)]
     units = [scaled(values, not design.flips) for values in curves]

@@ -32,6 +32,13 @@ def choose_exemplars(global_distances, n_exemplars, pattern=None):
     return half[np.round(evenly).astype(np.intp)]
 
 
+def exemplars_of_each(global_distances, n_exemplars):
+    """Exemplars of every trial, if it were the pattern: (n_exemplars, n_trials)."""
+    patterns = range(len(global_distances))
+    chosen = [choose_exemplars(global_distances, n_exemplars, n) for n in patterns]
+    return np.stack(chosen, axis=1)
+
+
 def vote(direct, to_exemplars, from_exemplars):
     """The median over all routes from the pattern to each trial.
 

@@ -157,6 +157,14 @@ class Filler(NamedTuple):
     times: tuple
 
     @classmethod
+    def learn(cls, arrays):
+        """The filler of a training set (n_frames_i, n_features), which may have gaps.
+
+        Every feature is seen somewhere.
+        """
+        return cls.of(*moments_of_seen(arrays), arrays)
+
+    @classmethod
     def of(cls, mean, covariance, arrays):
         """The filler of poses with these moments.
 

@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.special import ndtri
 
 from .anchors import KeyframeColumns
-from .consensus import choose_exemplars, smooth_warps, vote
+from .consensus import exemplars_of_each, smooth_warps, vote
 from .costs import COSTS
 from .counting import ROUNDING
 from .filters import SMOOTHING, smooth
@@ -22,7 +22,7 @@ from .gaps import UNSEEN
 from .metric import Metric, energy_shares, metric_of_matches
 from .refinement import Refiner
 from .sharpening import Sharpener
-from .sizes import FRAMES
+from .sizes import BATCH_NUMBERS, FRAMES
 from .tile import Bases
 from .trellis import Coupling, Trellis
 from .uncertainty import uncertainty_of_paths
@@ -250,11 +250,9 @@ class Matcher(NamedTuple):
         disparities, costs = self.trellis.paths_and_costs(sequences, sequences)
         times = times_of(disparities).astype(costs.dtype)
         typical = costs.sum(axis=1, dtype=np.float64)
-        # If each of them were the pattern.
-        exemplars = [choose_exemplars(typical, n_exemplars, n) for n in range(len(others))]
         # The base, the other and, (n_exemplars, n_pairs), the exemplars of every pair.
         n, m = np.repeat(np.arange(len(others)), others.shape[1]), others.ravel()
-        k = np.stack(exemplars, axis=1)[:, n]
+        k = exemplars_of_each(typical, n_exemplars)[:, n]
         voted = vote(times[n, m], times[n, k], times[k, m])
         smoothed = smooth_warps(voted, self.trellis.reach, warp_smoothing)
         return smoothed.reshape(*others.shape, -1)
@@ -459,6 +457,32 @@ class Warper:
         errors = self.finish.standard_errors(self.matcher.features.plain(positions), times)
         normal = np.ones(len(times), dtype=bool)
         return by_paths._replace(half_widths=ndtri(0.95) * errors, is_normal=normal)
+
+    def disparity_space(self, positions):
+        """E(p, d) of the pattern and one trial at the pattern's rate (Eq. 12), and the path.
+
+        Returns
+        -------
+        frames, offsets : ndarray
+            Those of the costs: all of them, or evenly spaced ones of many.
+        costs : ndarray, shape (n_frames, n_offsets)
+            NaN where no path may pass.
+        path : ndarray, shape (P,)
+        """
+        trellis, moving = self.matcher.trellis, self.matcher.features(positions)
+        base, width = self.bases.sequences[0], trellis.width
+        lows, highs = map(np.array, trellis.windows(len(base)))
+        every = math.ceil(math.sqrt(len(base) * (2 * width + 1) / BATCH_NUMBERS))
+        frames = np.arange(0, len(base), every)
+        offsets = every * np.arange(-(width // every), width // every + 1)
+        costs = np.full((len(frames), len(offsets)), np.nan)
+        for row, p in zip(costs, frames, strict=True):
+            inside = (lows[p] <= offsets) & (offsets <= highs[p])
+            window = moving[0, p + offsets[inside]]
+            squares = np.square((base[p] - window)[..., trellis.plain]).sum(axis=1)
+            row[inside] = trellis.weighed(squares, base[p], window)
+        path = trellis.paths(base[np.newaxis], moving)[0, 0]
+        return frames, offsets, costs, path
 
 
 # -- the warper of a part -----------------------------------------------------------------

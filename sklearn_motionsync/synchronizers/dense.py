@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from numbers import Integral, Real
 from typing import Any, Literal, Self
 
@@ -27,9 +26,7 @@ from ..matching.anchors import add_ramps, first_meeting, pin
 from ..matching.costs import COSTS
 from ..matching.counting import whole
 from ..matching.gaps import add_weights
-from ..matching.refinement import Refiner
 from ..matching.sharpening import Sharpener
-from ..matching.sizes import BATCH_NUMBERS
 from ..matching.warps import normalise
 from ..utils.parallel import one_blas_thread
 from .base import AnchoredSynchronizer
@@ -367,7 +364,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
             )
             # 3. All pairs are matched (Eqs. 12-17), if the pattern or the exemplars need that.
             needed = isinstance(pattern, str) or 0 < self.consensus < len(trials)
-            matcher, median = match_pairs(
+            pairs = match_pairs(
                 clock,
                 compared,
                 needed,
@@ -378,13 +375,13 @@ class DenseSynchronizer(AnchoredSynchronizer):
                 progress=progress,
             )
             # 4. The trial with the smallest sum of distances is the pattern (Eq. 19).
-            chosen = pattern_of(training, pattern, median)
+            chosen = pattern_of(training, pattern, pairs.median)
             # 5. Exemplars vote.
-            vote = let_exemplars_vote(clock, training, chosen, matcher, median, self.consensus)
+            vote = let_exemplars_vote(clock, training, chosen, pairs, self.consensus)
             # 6. Warps are sharpened or refined.
-            warper, unexplained = finish_warps(clock, training, chosen, vote, self.refine)
+            final = finish_warps(clock, training, chosen, vote, self.refine)
         numbers = np.array(trials.numbers)
-        features = matcher.features
+        features, finish = pairs.matcher.features, final.warper.finish
         distances = np.full(training.population, np.nan)
         distances[numbers] = chosen.distances
         metric, keyframes = compared.metric, vote.keyframes
@@ -396,19 +393,19 @@ class DenseSynchronizer(AnchoredSynchronizer):
             "sample_": numbers,
             "metric_": metric and Bunch(**metric | {"trials": numbers[metric.trials]}),
             "evidence_": compared.evidence,
-            "mu_": float(features.back(matcher.trellis.mu)),
+            "mu_": float(features.back(pairs.matcher.trellis.mu)),
             "exemplars_": numbers[vote.exemplars],
             "keyframes_": None if keyframes is None else keyframes * (clock.n_frames - 1),
-            "unexplained_variance_": unexplained,
-            "refines_": isinstance(warper.finish, Refiner),
-            "sharpening_": _described(warper.finish, clock.poses.shape[2]),
+            "unexplained_variance_": final.unexplained,
+            "refines_": final.refines,
+            "sharpening_": _described(finish, clock.poses.shape[2]),
             "interval_factor_": 1.0,
             "lengths_": clock.lengths,
             "examples_": clock.examples,
             "features_": features.replace(anchors=None, weighs=False),
             "_filler": training.filler,
             "_settings": compared.settings,
-            "_warper": warper,
+            "_warper": final.warper,
         }
 
     def _match(self, trials, keyframes=None, frame_rate=None):
@@ -537,28 +534,17 @@ class DenseSynchronizer(AnchoredSynchronizer):
                 f"trial={trial} is out of range: there are {len(trials)} "
                 f"trials, 0 to {len(trials) - 1}."
             )
-        warper, features = self._warper, self._warper.matcher.features
+        warper = self._warper
         arrays, _ = self._for_warper(trials, **self._given(X, keyframes, frame_rate))
-        moving = features(warper.positions([arrays[trial]]))
-        trellis, base = warper.matcher.trellis, warper.bases.sequences[0]
-        lows, highs = map(np.array, trellis.windows(len(base)))
-        every = math.ceil(math.sqrt(len(base) * (2 * trellis.width + 1) / BATCH_NUMBERS))
-        frames, reach = np.arange(0, len(base), every), trellis.width // every
-        offsets = every * np.arange(-reach, reach + 1)
-        costs = np.full((len(frames), len(offsets)), np.nan)
-        for row, p in zip(costs, frames, strict=True):
-            inside = (lows[p] <= offsets) & (offsets <= highs[p])
-            window = moving[0, p + offsets[inside]]
-            squares = np.square((base[p] - window)[..., trellis.plain]).sum(axis=1)
-            row[inside] = trellis.weighed(squares, base[p], window)
-        path = trellis.paths(base[np.newaxis], moving)[0, 0]
-        return Bunch(frames=frames, offsets=offsets, costs=features.back(costs), path=path)
+        positions = warper.positions([arrays[trial]])
+        frames, offsets, costs, path = warper.disparity_space(positions)
+        costs = warper.matcher.features.back(costs)
+        return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
 
 
 def _described(finish, n_features):
     """What sharpens warps, as ``sharpening_``; None if nothing does."""
     if not isinstance(finish, Sharpener):
         return None
-    agreement = np.full(n_features, np.nan)
-    agreement[finish.features] = finish.agreement
+    agreement = finish.agreement_of_all(n_features)
     return Bunch(agreement=agreement, width=finish.width, trust=finish.trust)

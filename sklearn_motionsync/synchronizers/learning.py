@@ -32,7 +32,7 @@ from ..matching.sharpening import Sharpener
 from ..matching.trellis import TILE_BASES
 from ..matching.warps import even_slices, sample
 from ..utils.parallel import one_blas_thread, run
-from .training import warn_of_one_feature
+from .training import known_whole, warn_of_one_feature
 
 # max_offset="auto". A wide band leads paths astray without a learnt metric; with one, gestures
 # need it: docs/design.md.
@@ -114,6 +114,20 @@ def learn_metric(clock, *, cost, metric, consensus, smoothness, max_offset, max_
 # -- step 3: all pairs are matched ------------------------------------------------------------
 
 
+class PairsStep(NamedTuple):
+    """Distances of all pairs, and what matches any two trials.
+
+    Attributes
+    ----------
+    matcher : Matcher
+    median : Median or None
+        None if no distances were asked for.
+    """
+
+    matcher: Matcher
+    median: Median | None
+
+
 def match_pairs(clock, step, wanted, *, trials, names, random_state, n_jobs, progress):
     """Match all pairs of a training set, or each trial with at most 100 drawn ones.
 
@@ -135,10 +149,7 @@ def match_pairs(clock, step, wanted, *, trials, names, random_state, n_jobs, pro
 
     Returns
     -------
-    matcher : Matcher
-        Of any two trials.
-    median : Median or None
-        None if no distances were asked for.
+    PairsStep
     """
     features, settings, positions = step.features, step.settings, clock.positions
     references = draw_references(len(positions), check_random_state(random_state))
@@ -172,7 +183,7 @@ def match_pairs(clock, step, wanted, *, trials, names, random_state, n_jobs, pro
         scale = clock.n_frames / (searched.frames or clock.n_frames)
         distances = features.back(median.distances) * scale
         median = Median(median.trial, distances)
-    return matcher, median
+    return PairsStep(matcher, median)
 
 
 def _energy_shares(features, compared):
@@ -206,7 +217,7 @@ class VoteStep(NamedTuple):
     keyframes: np.ndarray | None
 
 
-def let_exemplars_vote(clock, training, pattern, matcher, median, consensus):
+def let_exemplars_vote(clock, training, pattern, pairs, consensus):
     """Match the pattern with the exemplars, by way of which trials are warped.
 
     If only some trials have key-frames, they are the exemplars. Key-frames of the pattern that are
@@ -217,8 +228,7 @@ def let_exemplars_vote(clock, training, pattern, matcher, median, consensus):
     clock : CommonClock
     training : TrainingSet
     pattern : Pattern
-    matcher : Matcher
-    median : Median or None
+    pairs : PairsStep
     consensus : int
         Number of exemplars; 0 for direct paths.
 
@@ -226,7 +236,7 @@ def let_exemplars_vote(clock, training, pattern, matcher, median, consensus):
     -------
     VoteStep
     """
-    exemplars = _choose_exemplars(training, pattern, median, consensus)
+    exemplars = _choose_exemplars(training, pattern, pairs.median, consensus)
     smoothing = FINE_SMOOTHING if consensus > 0 else None
     source = pattern.array
     if clock.weighs:
@@ -239,8 +249,8 @@ def let_exemplars_vote(clock, training, pattern, matcher, median, consensus):
         arrays = [array, *(clock.arrays[k] for k in exemplars)]
         # In double precision, as all trials that are warped.
         arrays = [x.astype(np.float64, copy=False) for x in arrays]
-        positions = matcher.features.positions(arrays, clock.n_frames)
-        return Warper.to_pattern(matcher, positions, smoothing)
+        positions = pairs.matcher.features.positions(arrays, clock.n_frames)
+        return Warper.to_pattern(pairs.matcher, positions, smoothing)
 
     if training.keyframes is None:
         return VoteStep(exemplars, warper_to(source), None)
@@ -281,6 +291,22 @@ def _choose_exemplars(training, pattern, median, consensus):
 # -- step 6: warps are sharpened, or refined ---------------------------------------------------
 
 
+class FinishStep(NamedTuple):
+    """The warper that finishes warps, and why it does so.
+
+    Attributes
+    ----------
+    warper : Warper
+    unexplained : float
+        Share of the variance of the pattern that matching and white noise leave unexplained.
+    refines : bool
+    """
+
+    warper: Warper
+    unexplained: float
+    refines: bool
+
+
 def finish_warps(clock, training, pattern, vote, refine):
     """Sharpen warps of people, and refine those of copies of one source.
 
@@ -295,10 +321,7 @@ def finish_warps(clock, training, pattern, vote, refine):
 
     Returns
     -------
-    warper : Warper
-        Which finishes warps.
-    unexplained : float
-        Share of the variance of the pattern that matching and white noise leave unexplained.
+    FinishStep
     """
     warper, unexplained = vote.warper, np.nan
     # Poses would take away again what soft key-frames draw.
@@ -317,7 +340,7 @@ def finish_warps(clock, training, pattern, vote, refine):
         reach = warper.matcher.trellis.reach
         times = smooth_warps(warper.to_exemplars, reach, warper.smoothing)
         finish = Sharpener.learn(features.metric, warper.pattern, exemplars, times)
-    return replace(warper, finish=finish), unexplained
+    return FinishStep(replace(warper, finish=finish), unexplained, refines)
 
 
 def _unexplained(clock, training, pattern, vote):
@@ -325,9 +348,7 @@ def _unexplained(clock, training, pattern, vote):
 
     NaN if there are none but the pattern, or no vote.
     """
-    n_trials = len(training.trials)
-    weights = training.trials.weights or [np.ones(1)] * n_trials
-    whole = np.array([i for i, w in enumerate(weights) if i != pattern.trial and w.min() == 1])
+    whole = known_whole(training.trials, pattern.trial)
     if not len(whole) or vote.warper.smoothing is None:
         return np.nan
     evenly = np.linspace(0, len(whole) - 1, min(len(whole), MOST_LEARNT))

@@ -115,15 +115,7 @@ class LinearSynchronizer(AnchoredSynchronizer):
         times = piecewise_linear(mean, keyframes, clock.n_frames)
         comparable = clock.unit(sample(training.trials, times, clock.n_frames))
         learnt = self._learnt(training, clock, pattern, comparable)
-        index, of_pattern = learnt["pattern_index_"], np.full(keyframes.shape[1], np.nan)
-        if index is not None:
-            of_pattern = keyframes[index]
-        unknown = np.isnan(of_pattern)
-        if unknown.any():
-            # Where those of the others meet it.
-            times = piecewise_linear(of_pattern, keyframes, clock.n_frames)
-            met = np.nanmedian(first_meeting(times, keyframes), axis=0)
-            of_pattern = np.maximum.accumulate(np.where(unknown, met, of_pattern))
+        of_pattern = keyframes_of_pattern(learnt["pattern_index_"], keyframes, clock.n_frames)
         return learnt | {"keyframes_": of_pattern}
 
 
@@ -145,3 +137,27 @@ def piecewise_linear(keyframes, of_trials, n_frames):
         known = np.isfinite(keyframes + shown)
         tau[:] = np.interp(frames, [0, *keyframes[known], last], [0, *shown[known], last])
     return times
+
+
+def keyframes_of_pattern(index, keyframes, n_frames):
+    """Key-frames of the pattern: its own, or the median of where those of the others meet it.
+
+    Parameters
+    ----------
+    index : int or None
+        Of the pattern among the trials.
+    keyframes : ndarray, shape (n_trials, n_keyframes)
+        In frames of the clock; NaN where one is not known.
+    n_frames : int
+        ``P``.
+
+    Returns
+    -------
+    ndarray, shape (n_keyframes,)
+    """
+    known = np.full(keyframes.shape[1], np.nan) if index is None else keyframes[index]
+    if np.isfinite(known).all():
+        return known
+    times = piecewise_linear(known, keyframes, n_frames)
+    met = np.nanmedian(first_meeting(times, keyframes), axis=0)
+    return np.maximum.accumulate(np.where(np.isnan(known), met, known))

@@ -21,7 +21,7 @@ from ..inputs.tables import as_pandas
 from ..inputs.wording import counted
 from ..matching.anchors import KeyframeColumns, add_ramps
 from ..matching.counting import first_largest
-from ..matching.gaps import Filler, add_weights, is_gappy, moments_of_seen
+from ..matching.gaps import Filler, add_weights, is_gappy
 from ..matching.sizes import BATCH, EQUAL
 from ..matching.units import Unit
 from ..matching.warps import even_slices, normalise
@@ -393,7 +393,7 @@ def learn_filler(trials, names=None):
             f"{never.sum()} of {counted(len(never), 'feature')}. Leave such out, or add a "
             "trial that shows them."
         )
-    return Filler.of(*moments_of_seen(trials), trials)
+    return Filler.learn(trials)
 
 
 def fill_trials(filler, trials):
@@ -441,6 +441,12 @@ def _refuse_padding(trials):
             )
 
 
+def known_whole(trials, but):
+    """Indices of filled trials that had no gaps, but for one."""
+    weights = trials.weights or [np.ones(1)] * len(trials)
+    return np.array([i for i, w in enumerate(weights) if i != but and w.min() == 1], np.intp)
+
+
 def check_fill(fill):
     """Refuse a ``fill`` that there is not."""
     if fill is not None and not (isinstance(fill, str) and fill == "model"):
@@ -462,8 +468,7 @@ def fill_warped(warped, examples):
         Warped, without gaps.
     """
     mean = examples.mean(axis=0)
-    deviations = list(examples - mean)
-    filler = Filler.of(*moments_of_seen(deviations), deviations)
+    filler = Filler.learn(list(examples - mean))
     for x in warped:
         if is_gappy(x):
             np.copyto(x, filler(x - mean)[0] + mean, where=np.isnan(x))

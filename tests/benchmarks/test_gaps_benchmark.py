@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync.matching.gaps import Filler, moments_of_seen
+from sklearn_motionsync.matching.gaps import Filler
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_velocities_of_people_are_filled_better_than_over_time_alone(gaps, real_
         positions = gaps.hide(action, "joints", [0, i])
         cosines = gaps.to_cosines(action, positions)
         truth = gaps.to_cosines(action, action.data)
-        filler = Filler.of(*moments_of_seen(cosines), cosines)
+        filler = Filler.learn(cosines)
         filled = {
             "own": [filler(x)[0] for x in cosines],
             "fill_gaps": gaps.by_fill_gaps(cosines, action, positions),

@@ -74,7 +74,7 @@ def test_disparity_space_of_long_takes_is_subsampled(bunch, pipe, monkeypatch):
     points = pipe[:2].transform(bunch.data)
     whole = TrellisDisplay.from_estimator(pipe[2], points, trial=1)
     monkeypatch.setattr(
-        "sklearn_motionsync.synchronizers.dense.BATCH_NUMBERS", whole.space.costs.size // 7
+        "sklearn_motionsync.matching.matcher.BATCH_NUMBERS", whole.space.costs.size // 7
     )
     thin = TrellisDisplay.from_estimator(pipe[2], points, trial=1)
     np.testing.assert_array_equal(thin.space.frames, np.arange(0, 30, 3))

@@ -156,7 +156,7 @@ def correlations(n_frames, value_time, velocity_time):
 
 
 def of_times(value_time, velocity_time):
-    learnt = Filler.of(*moments_of_seen(curves()), curves())
+    learnt = Filler.learn(curves())
     times = value_time, velocity_time
     return Filler(learnt.mean, learnt.scale, learnt.precision, learnt.variance, times)
 
@@ -289,7 +289,7 @@ def test_longer_gaps_stay_hidden():
 
 def test_ends_are_held_and_a_feature_never_seen_has_its_mean():
     flat = [np.full((30, 2), 3.0) + np.arange(2) for _ in range(4)]
-    filler = Filler.of(*moments_of_seen(flat), flat)
+    filler = Filler.learn(flat)
     gappy = flat[0].copy()
     gappy[:8, 0], gappy[:, 1] = np.nan, np.nan
     filled, _ = filler(gappy)

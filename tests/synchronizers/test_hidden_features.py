@@ -261,11 +261,14 @@ def test_confidence_goes_through_pipelines_and_searches():
     assert np.abs(found["test_score"] - plain["test_score"]).max() < 0.2
 
 
-def test_confidence_of_a_sample():
+def test_confidence_of_a_sample_and_of_timing():
     sure = confidences(GAPPY)
     sync = DenseSynchronizer(P, max_fit=5).fit(GAPPY, confidence=sure)
     expected = DenseSynchronizer(P, max_fit=5).fit(GAPPY)
     np.testing.assert_array_equal(sync.pattern_, expected.pattern_)
+    timing = TimingChannel(DENSE).fit(GAPPY, confidence=sure)
+    found = timing.transform(GAPPY, confidence=sure)
+    np.testing.assert_array_equal(found, TimingChannel(DENSE).fit(GAPPY).transform(GAPPY))
 
 
 WRONG = {

@@ -9,7 +9,6 @@ from sklearn_motionsync import (
     LinearSynchronizer,
 )
 from sklearn_motionsync.inputs.collections import Trials
-from sklearn_motionsync.matching.refinement import Refiner
 from sklearn_motionsync.synchronizers import learning
 from sklearn_motionsync.synchronizers.learning import (
     finish_warps,
@@ -61,22 +60,21 @@ def test_six_steps_by_hand_arrive_at_the_same_times(params):
         clock = put_on_clock(training, None, None, "fewer frames")
         step = learn_metric(clock, **{name: settings[name] for name in names})
         jobs = {"random_state": 0, "n_jobs": None, "progress": progress}
-        matcher, median = match_pairs(clock, step, True, trials=trials, names=None, **jobs)
-        pattern = pattern_of(training, sync.pattern, median)
-        vote = let_exemplars_vote(clock, training, pattern, matcher, median, sync.consensus)
-        warper, unexplained = finish_warps(clock, training, pattern, vote, "auto")
+        pairs = match_pairs(clock, step, True, trials=trials, names=None, **jobs)
+        pattern = pattern_of(training, sync.pattern, pairs.median)
+        vote = let_exemplars_vote(clock, training, pattern, pairs, sync.consensus)
+        final = finish_warps(clock, training, pattern, vote, "auto")
         distances, times = warp_in_portions(
-            warper, X, n_jobs=None, begin=lambda fits: progress, name="warping"
+            final.warper, X, n_jobs=None, begin=lambda fits: progress, name="warping"
         )
     assert pattern.trial == sync.pattern_index_
     np.testing.assert_array_equal(pattern.distances, sync.global_distances_)
     np.testing.assert_array_equal(vote.exemplars, sync.exemplars_)
-    np.testing.assert_array_equal(unexplained, sync.unexplained_variance_)
-    refines = isinstance(warper.finish, Refiner)
-    assert refines == sync.refines_ == (params == {} and sync.unexplained_variance_ < 0.025)
+    np.testing.assert_array_equal(final.unexplained, sync.unexplained_variance_)
+    assert final.refines == sync.refines_ == (params == {} and sync.unexplained_variance_ < 0.025)
     match = sync.match(X)
     np.testing.assert_array_equal(times, match.times)
-    back = matcher.features.back(distances)
+    back = pairs.matcher.features.back(distances)
     np.testing.assert_array_equal(back, match.distances)
 
 
@@ -92,14 +90,13 @@ def test_steps_change_nothing_that_they_are_given():
     step = learn_metric(clock, cost="velocity", metric="learned", consensus=8, **settings)
     with Progress(DenseSynchronizer(), 0) as progress:
         jobs = {"random_state": 0, "n_jobs": None, "progress": progress}
-        trials = training.trials
-        matcher, median = match_pairs(clock, step, True, trials=trials, names=None, **jobs)
-    pattern = pattern_of(training, "median", median)
-    vote = let_exemplars_vote(clock, training, pattern, matcher, median, 8)
+        pairs = match_pairs(clock, step, True, trials=training.trials, names=None, **jobs)
+    pattern = pattern_of(training, "median", pairs.median)
+    vote = let_exemplars_vote(clock, training, pattern, pairs, 8)
     first, again = (finish_warps(clock, training, pattern, vote, "auto") for _ in range(2))
-    assert first[1] == again[1]
+    assert first.unexplained == again.unexplained
     assert vote.warper.finish is None
-    assert first[0].finish is not None
+    assert first.warper.finish is not None
     np.testing.assert_array_equal(clock.positions, before)
 
 
