@@ -111,7 +111,7 @@ def test_synchronizer_is_found_in_nested_pipelines(name, few, flat):
     assert TrellisDisplay.from_estimator(pipe, few.data).space.costs.shape[0] == 40
     assert sorted(MetricDisplay.from_estimator(pipe).feature_names) == figures.ylabels
     assert len(SkeletonDisplay.from_estimator(pipe, few.data).axes_) == 2
-    assert len(SkeletonDisplay.from_model(pipe, n_samples=2).axes_) == 4
+    assert len(SkeletonDisplay.from_model(pipe).axes_) == 4
 
 
 def test_absent_step_of_a_nested_pipeline_is_refused(few):

@@ -27,7 +27,6 @@ from ..utils.groups import encode_groups, group_counts, refuse_classes_as_people
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .acceptance import LEAST, log_moments
-from .density import TrialDensity
 from .similarity import (
     Neighbours,
     PersonalReference,
@@ -113,8 +112,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
 
     Notes
     -----
-    1. The mean trial and the variance of every pose are those of Fig. 3d. The density of a trial is
-       that of smooth curves, whose covariance over frames and features is learnt, and noise.
+    1. The mean trial and the variance of every pose give the density of a trial, by independent
+       normal distributions (Fig. 3d).
     2. The envelope is the mean, plus and minus ``n_std`` standard deviations. A pose is accepted at
        a frame if all of its features lie inside. Of new people it holds about 97 % of single values
        with 3 standard deviations, and half of the whole poses, as many features may leave it.
@@ -308,20 +307,17 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     # -- whole trials -------------------------------------------------------------------
 
     def score_samples(self, X: TrialsLike) -> np.ndarray:
-        """Log-density of whole trials, of curves that vary smoothly and together.
+        """Log-density of trials: independent normal distributions at every pose.
 
-        It is that of a normal distribution over all frames and features: what people do at one
-        frame tells what they do at the next, and one feature of others. Its covariance is learnt
-        from the trials that are kept (``deviations_``). For the choice between models of different
-        actions. Not for whether a trial is the action at all, which `predict` tells: standing
-        still at the mean pose is dense.
+        For the choice between models of different actions. Not for whether a trial is the
+        action at all, which `predict` tells: standing still at the mean pose is dense.
 
         It is a sum over all frames and features, in the unit of the data. Compare it only between
         models of equal ``P``, features and scaling. See `score` for what to use instead.
 
-        With gaps (NaN) it is the density of what was seen, the marginal one, of fewer values. It
-        compares models of one trial as it does without gaps. Two trials with different gaps have
-        densities of different length: compare their `dissimilarity`.
+        With gaps (NaN) it is the density of what was seen, the marginal one: a sum over fewer
+        values. It compares models of one trial as it does without gaps. Two trials with
+        different gaps have sums of different length: compare their `dissimilarity`.
 
         Parameters
         ----------
@@ -334,9 +330,14 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             The natural logarithm of the density.
         """
         trials = self.check_trials(X)
-        mean = self.mean_.astype(np.float64)
-        kept = mean + self.deviations_.astype(np.float64)
-        return TrialDensity(mean, kept, self._variance_floor).log_densities(trials)
+        std = np.sqrt(np.maximum(self.variance_, self._variance_floor))
+        densities = np.empty(len(trials))
+        for i, x in enumerate(trials):
+            # Of what was seen.
+            seen, squares = ~np.isnan(x), np.nansum(np.square((x - self.mean_) / std))
+            log_std = np.log(std[seen]).sum(dtype=np.float64)
+            densities[i] = -0.5 * squares - log_std - 0.5 * seen.sum() * np.log(2 * np.pi)
+        return densities
 
     def score(
         self,

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..inputs.wording import counted
 from ..matching.filters import smooth
 from ..matching.gaps import fill_with_mean, is_gappy
 from ..matching.warps import even_slices
@@ -354,9 +355,9 @@ def warn_of_reference(is_refused):
     if is_refused.mean() > 0.5:
         refused = ", ".join(map(str, np.flatnonzero(is_refused)))
         warnings.warn(
-            f"{is_refused.sum()} of the {len(is_refused)} trials of the reference are themselves "
-            f"refused when they are judged without one (numbers {refused}). What is like them is "
-            "accepted: give right trials of the person, or no reference.",
+            f"Of the reference, {counted(int(is_refused.sum()), 'trial')} of {len(is_refused)} would "
+            f"be refused without one (numbers {refused}). What is like them is accepted: give right "
+            "trials of the person, or no reference.",
             SynchronizationWarning,
             stacklevel=3,
         )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 from sklearn_motionsync import ActionModel
 
 
@@ -18,6 +19,12 @@ def trials():
 @pytest.fixture(scope="module")
 def model(trials):
     return ActionModel().fit(trials)
+
+
+def test_density_equals_that_of_normal_distributions(model, trials):
+    expected = norm(trials.mean(axis=0), trials.std(axis=0)).logpdf(trials)
+    np.testing.assert_allclose(model.score_samples(trials), expected.sum(axis=(1, 2)))
+    np.testing.assert_allclose(model.score(trials), expected.sum(axis=(1, 2)).mean())
 
 
 def test_accepts_poses_inside_in_every_feature(model):
@@ -76,6 +83,11 @@ def test_a_constant_feature_does_not_hide_the_others(trials):
     model = ActionModel().fit(X)
     assert np.isfinite(model.score_samples(X)).all()
     assert (model.variance_[:, 1] == 0).all()
+    # A billionth of the variance of the feature that varies most, over time and trials.
+    floor = 1e-9 * max(X[:, :, k].var() for k in range(3))
+    std = np.sqrt(np.maximum(X.var(axis=0), floor))
+    expected = norm(X.mean(axis=0), std).logpdf(X).sum(axis=(1, 2))
+    np.testing.assert_allclose(model.score_samples(X), expected)
     other = X[:1] + [0, 0.5, 0]
     assert model.score_samples(other)[0] < model.score_samples(X).min() - 1e6
     assert not model.accepts(other[0], 0).any()

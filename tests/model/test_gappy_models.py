@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 from sklearn import clone
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
@@ -60,9 +61,18 @@ def test_mean_variance_and_share_are_those_of_what_was_seen(gaps):
     np.testing.assert_array_equal(model.missing_, np.isnan(gaps).mean(axis=0))
 
 
-def test_the_density_of_a_trial_depends_on_no_gaps_of_others(gaps):
+def test_density_is_the_marginal_one_of_what_was_seen(gaps):
     model = ActionModel().fit(gaps)
     new = hide(trials(5, seed=3), seed=4, share=0.8)
+    mean, variance = model.mean_.ravel(), model.variance_.ravel()
+    expected = []
+    for x in new.reshape(5, -1):
+        seen = np.flatnonzero(~np.isnan(x))
+        marginal = stats.multivariate_normal(mean[seen], np.diag(variance[seen]))
+        expected.append(marginal.logpdf(x[seen]))
+    np.testing.assert_allclose(model.score_samples(new), expected, rtol=1e-10)
+    np.testing.assert_allclose(model.score(new), np.mean(expected), rtol=1e-10)
+    # Others of the same call are as without gaps.
     whole = trials(2, seed=3)
     alone = model.score_samples(whole)
     np.testing.assert_array_equal(model.score_samples([*whole, new[0]])[:2], alone)
