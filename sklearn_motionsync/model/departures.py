@@ -159,6 +159,11 @@ def find_departures(
     if limit is not None and not (is_number and 0 < limit < np.inf):
         raise ValueError(f"limit must be a number above 0, or None; got {limit!r}.")
     judged = judge(estimator, X, params, "find_departures", features=features, reference=reference)
+    return _table_of(judged, limit)
+
+
+def _table_of(judged, limit):
+    """The table of departures of all trials."""
     space, labels = judged.space, judged.view.labels
     rows = [row for i in range(len(labels)) for row in judged.rows(i, limit)]
     table = pd.DataFrame(rows, columns=_COLUMNS, dtype=object).astype(_DTYPES)
@@ -254,7 +259,8 @@ class Judged(NamedTuple):
         is_refused = limit is None and self.refused is not None and bool(self.refused[i])
         if limit is None and self.refused is not None and not is_refused:
             return []
-        rows = []
+        # Rows, and how far their evidence is beyond what is rare.
+        rows, evidence = [], []
         for fault in self.faults[i]:
             row = self._row(i, fault)
             if row is None or not abs(row.deviation) > (limit or 0):
@@ -266,14 +272,13 @@ class Judged(NamedTuple):
             same = [r for r in rows if r.feature == row.feature and r.unit == row.unit]
             if not any(r.first <= row.peak <= r.last for r in same):
                 rows.append(row)
-        of_whole = sorted(self.of_whole[i], key=lambda fault: -fault.excess)
-        rows = [
-            self._row_of_whole(i, fault)
-            for fault in of_whole
-            if np.isnan(fault.deviation) or abs(fault.deviation) > (limit or 0)
-        ] + rows
-        # What is rare comes first, of the whole body before its parts.
-        rows.sort(key=lambda row: not row.rare)
+                evidence.append(min([fault.score / self.rare_score, *evidence[-1:]]))
+        for fault in self.of_whole[i]:
+            if np.isnan(fault.deviation) or abs(fault.deviation) > (limit or 0):
+                rows.append(self._row_of_whole(i, fault))
+                evidence.append(fault.rarity)
+        order = np.argsort(-np.array(evidence), kind="stable")
+        rows = [rows[k] for k in order]
         if is_refused and not rows:
             another = WholeFault("another movement", 0.0, 1.0, np.nan, "", 1.0, 1.0, np.nan)
             rows = [self._row_of_whole(i, another)]

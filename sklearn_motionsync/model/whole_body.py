@@ -13,7 +13,7 @@ from .acceptance import PRIOR_COUNT, LogPredictionInterval
 # Standard deviation of the Gaussian under which speeds are estimated, as a share of the time.
 _SMOOTHING = 0.01
 # A movement starts, and stops, where so much of its squared speed is over, or is still to come.
-_AT_ENDS = 0.05
+_AT_ENDS = 0.01
 # It pauses where the squared speed of its mean part is below this share of the mean.
 _SLOW = 0.02
 # Shares of the time are compared by their logarithms, with so much added; and the prior variance
