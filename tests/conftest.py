@@ -33,6 +33,13 @@ def benchmark():
         yield importlib.import_module
 
 
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """Figures of a report are made and not rendered, which takes most of its time."""
+    save = "matplotlib.figure.Figure.savefig"
+    monkeypatch.setattr(save, lambda figure, file, **settings: file.write(b"\x89PNG"))
+
+
 @pytest.fixture(scope="module")
 def known_warps(benchmark):
     """Copies of a random movement with gains and known warps, of rates from 0.5 to 2."""

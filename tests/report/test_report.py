@@ -41,9 +41,8 @@ SYNC = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(51)).fit(TRI
 LINEAR = LinearSynchronizer(20).fit(TRIALS)
 
 
-@pytest.fixture(autouse=True)
-def small_pictures(monkeypatch):
-    monkeypatch.setattr(page, "DPI", 40)
+# Those of `groups` are rendered, and of two that must be equal.
+pytestmark = pytest.mark.usefixtures("without_pictures")
 
 
 class Text(HTMLParser):
@@ -125,6 +124,7 @@ def groups(tmp_path_factory):
     path = tmp_path_factory.mktemp("groups") / "report.html"
     out = {"walk 99": "it was cut off", 7: "no force plate"}
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "DPI", 40)
         figures = capture_figures(patch)
         text = Text(write_report(path, SYNC, TRIALS, **GIVEN, left_out=out, title="Gait"))
     text.figures = figures
@@ -544,7 +544,9 @@ def test_the_page_loads_nothing(groups):
     assert "default-src 'none'" in policy[0]
 
 
-def test_the_same_input_gives_the_same_bytes(tmp_path, groups):
+def test_the_same_input_gives_the_same_bytes(tmp_path, monkeypatch):
+    monkeypatch.undo()
+    monkeypatch.setattr(page, "DPI", 40)
     found = []
     step = FunctionTransformer(func=lambda x: x)  # its repr has an address
     for k in range(2):

@@ -154,6 +154,7 @@ def test_methods_refuse_labels_by_the_name_of_their_parameter(method):
             call(list("abcde"))
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("method", METHODS)
 def test_methods_refuse_a_single_group_where_two_are_needed(method):
     fit, needs_two = METHODS[method]
@@ -165,6 +166,7 @@ def test_methods_refuse_a_single_group_where_two_are_needed(method):
         fit(["a"] * N)
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("method", METHODS)
 def test_methods_accept_numbers_in_columns(method):
     # People with one label of y each.
