@@ -18,7 +18,7 @@ from sklearn_motionsync.inputs.recorded import (
     timeless,
 )
 
-from estimators import EVERY, by_name, data_for
+from estimators import all_of, by_name, data_for
 
 RATE = 120.0
 SECONDS = np.arange(60) / RATE
@@ -207,7 +207,10 @@ SPLIT = r"Trial \d.*: rows look split, as by cross-validation of rows.*to_trials
 
 @pytest.mark.parametrize(
     ("estimator", "rate"),
-    [*((estimator, None) for estimator in EVERY), (LinearSynchronizer(), 30)],
+    [
+        *((each, None) for each in all_of("ASpace", "DenseSynchronizer", "CycleSegmenter")),
+        (LinearSynchronizer(), 30),
+    ],
     ids=by_name,
 )
 def test_rows_split_by_cross_validation_are_warned_of(estimator, rate):

@@ -243,20 +243,6 @@ def test_grid_search_with_key_frames_in_a_pipeline(scorer, ends_in_model, bunch)
 
 
 @pytest.mark.usefixtures("routing")
-def test_several_scorers_with_aliases(bunch, points):
-    scoring = {
-        "spread": SpreadScorer().set_score_request(keyframes="marks"),
-        "blind": FeatureHoldoutScorer(n_folds=2).set_score_request(keyframes="marks"),
-    }
-    results = cross_validate(
-        LinearSynchronizer(40).set_fit_request(keyframes="marks"), points, cv=2,
-        scoring=scoring, params={"marks": bunch.keyframes}, error_score="raise",
-    )  # fmt: skip
-    for name in ("test_spread", "test_blind"):
-        assert np.isfinite(results[name]).all()
-
-
-@pytest.mark.usefixtures("routing")
 @pytest.mark.parametrize("scorer", SCORERS)
 def test_key_frames_that_were_not_requested_are_refused(scorer, bunch, points):
     def score(scoring):

@@ -64,16 +64,6 @@ def test_samples_are_accepted(trials, n_std):
     assert model.sample(random_state=0).shape == (1, 15, 3)
 
 
-def test_rows_are_univariate_trials(trials):
-    rows = trials[:, :, 0]
-    model = ActionModel().fit(rows)
-    assert model.mean_.shape == (15, 1)
-    assert model.sample(4, random_state=0).shape == (4, 15)
-    columns = ActionModel().fit(trials[:, :, :1])
-    expected = columns.score_samples(trials[:, :, :1])
-    np.testing.assert_array_equal(model.score_samples(rows), expected)
-
-
 # -- limits -----------------------------------------------------------------------------
 
 

@@ -12,7 +12,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    LinearSynchronizer,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.filters import smooth
@@ -321,14 +320,3 @@ def test_departures_of_a_pipeline_are_those_of_limbs_that_were_seen():
     new[35:75, wrist : wrist + 3] = np.nan
     table = find_departures(pipe, [new])
     assert not table["feature"].str.startswith("right_forearm").any()
-
-
-def test_gaps_through_a_synchronizer_and_a_model():
-    bunch = make_bending(8, random_state=0)
-    elbow = 3 * bunch.skeleton.index_of("left_elbow")
-    gaps = [x.copy() for x in bunch.data]
-    for x in gaps[::3]:
-        x[30:60, elbow : elbow + 3] = np.nan
-    cosines = DirectionCosines(bunch.skeleton, hidden="nan")
-    pipe = make_pipeline(cosines, ASpace(3), LinearSynchronizer(50), ActionModel())
-    assert (pipe.fit(gaps).predict(gaps) == 1).all()

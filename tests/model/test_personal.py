@@ -6,7 +6,7 @@ from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ActionDetector, ActionModel, ASpace, DenseSynchronizer
 from sklearn_motionsync.model.similarity import PersonalReference
-from test_similarity import slow_threshold, slow_velocity
+from test_similarity import slow_ratio, slow_threshold
 
 P = 40
 
@@ -27,14 +27,6 @@ def people(n_people, n_times, seed=0, style=0.5, repeat=0.05):
 
 X, GROUPS = people(6, 5)
 NEW, PERSONS = people(4, 8, seed=1)
-
-
-def slow_ratio(y, z, weight):
-    apart = ((y - y.mean(0) - z + z.mean(0)) ** 2).sum()
-    apart += weight * len(y) * ((y.mean(0) - z.mean(0)) ** 2).sum()
-    moved = ((y - y.mean(0)) ** 2).sum() + ((z - z.mean(0)) ** 2).sum()
-    v, w = slow_velocity(y), slow_velocity(z)
-    return apart / moved / 2 + ((v - w) ** 2).sum() / ((v**2).sum() + (w**2).sum()) / 2
 
 
 def slow_weight(X, groups):
@@ -69,7 +61,7 @@ def test_dissimilarity_and_threshold_equal_slow_loops(m):
         return some + (factors - 1) * (some.mean(axis=0) - mean)
 
     def nearest(y, some, mean):
-        return min(slow_ratio(y, z, weight) for z in moved(some, mean))
+        return min(slow_ratio(y, z, (1, weight)) for z in moved(some, mean))
 
     expected = [nearest(y, own, X.mean(axis=0)) for y in new]
     np.testing.assert_allclose(model.dissimilarity(new, reference=own), expected, rtol=1e-9)

@@ -189,14 +189,6 @@ def test_groups_lower_temperature_threshold_and_held_out_values(known, fitted):
 # -- invariances ------------------------------------------------------------------------
 
 
-def test_decisions_do_not_depend_on_jobs(known, fitted, new):
-    X, y, people = known
-    two = ActionClassifier(n_frames=30, n_jobs=2).fit(X, y, groups=people)
-    expected = fitted.decision_function(new[0])
-    np.testing.assert_array_equal(two.decision_function(new[0]), expected)
-    assert two.temperature_ == fitted.temperature_
-
-
 @pytest.mark.parametrize("scale", [2.0**-26, 2.0**25])
 def test_decisions_do_not_depend_on_unit_or_origin(known, fitted, new, scale):
     X, y, people = known

@@ -11,7 +11,6 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     FrameWise,
     LinearSynchronizer,
-    PartSynchronizer,
     to_frame,
 )
 from sklearn_motionsync.datasets import make_gait
@@ -54,13 +53,12 @@ def test_forms_of_keyframes_are_one(form):
     np.testing.assert_array_equal(found, expected)
 
 
-@pytest.mark.parametrize(
-    "sync", [DenseSynchronizer(40), PartSynchronizer({"leg": [0, 1]}), LinearSynchronizer(40)]
-)
-def test_forms_of_trials_are_one(sync):
-    expected = clone(sync).fit(X, keyframes=SOME).transform(X, keyframes=SOME)
+def test_forms_of_trials_are_one():
+    """Of synchronizers of other kinds tests/test_seams.py tries it."""
+    sync = LinearSynchronizer(40)
+    expected = sync.fit(X, keyframes=SOME).transform(X, keyframes=SOME)
     for given in (TABLES, to_frame(TABLES)):
-        found = clone(sync).fit_transform(given, keyframes=pd.DataFrame(SOME, index=INDEX))
+        found = sync.fit_transform(given, keyframes=pd.DataFrame(SOME, index=INDEX))
         np.testing.assert_array_equal(np.asarray(found).reshape(expected.shape), expected)
 
 

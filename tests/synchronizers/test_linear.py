@@ -94,36 +94,22 @@ def test_transform_needs_keyframes_after_a_fit_with_them(bending):
 # -- what counts frames in another way ------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("n_frames", "frames", "is_refused"),
-    [
-        (100, [0.62], True),
-        (100, [0.31, 0.62], True),
-        (12, [0.25, 0.9], True),
-        (300, [0.62, 1.4, 2.5], True),
-        # Whole frames, few frames, and frames further back.
-        (300, [1, 4], False),
-        (3, [0.5], False),
-        (100, [0.5, 1.99], False),
-        (300, [2.5, 6.1], False),
-    ],
-)
-def test_keyframes_in_seconds_are_refused(n_frames, frames, is_refused):
-    X = [np.arange(50.0)[:, None] ** 2, np.arange(float(n_frames))[:, None]]
-    late = [20 + 5 * k for k in range(len(frames))]
+def test_keyframes_in_seconds_are_refused():
+    """From where they do, tests/inputs/test_recorded.py tries."""
+    X = [np.arange(50.0)[:, None] ** 2, np.arange(300.0)[:, None]]
+    late, frames = [20, 25, 30], [0.62, 1.4, 2.5]
     sync = LinearSynchronizer().fit(X[:1] * 2, keyframes=[late, late])
     calls = [
-        lambda: LinearSynchronizer().fit(X, keyframes=[late, frames]),
-        lambda: sync.match(X, keyframes=[late, frames]),
-        lambda: sync.transform(X, keyframes=[late, frames]),
-        lambda: keyframe_error([range(50)] * 2, [late, frames], late, [50, n_frames]),
+        lambda frames: LinearSynchronizer().fit(X, keyframes=[late, frames]),
+        lambda frames: sync.match(X, keyframes=[late, frames]),
+        lambda frames: sync.transform(X, keyframes=[late, frames]),
+        lambda frames: keyframe_error([range(50)] * 2, [late, frames], late, [50, 300]),
     ]
     for call in calls:
-        if is_refused:
-            with pytest.raises(ValueError, match=r"Trial 1: .* look like seconds, .*_rate"):
-                call()
-        else:
-            call()
+        with pytest.raises(ValueError, match=r"Trial 1: .* look like seconds, .*_rate"):
+            call(frames)
+        # Whole frames.
+        call([1, 4, 5])
 
 
 def test_events_of_other_rows_are_no_keyframes():

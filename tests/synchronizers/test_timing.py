@@ -69,15 +69,6 @@ def test_offset_and_its_error_are_the_last_features(points, params, clock, error
     assert (single.dtype, single.shape) == (np.float32, (7, 30, len(names)))
 
 
-def test_match_is_that_of_the_synchronizer(points):
-    channel = TimingChannel(DenseSynchronizer(30, pattern=2)).fit(points)
-    inner = channel.synchronizer_
-    np.testing.assert_array_equal(channel.match(points).times, inner.match(points).times)
-    assert (channel.n_frames_, channel.n_features_in_) == (30, 3)
-    assert not hasattr(channel, "feature_names_in_")
-    assert channel.synchronizer is not inner
-
-
 def test_rows_give_curves_followed_by_offsets_and_errors():
     rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
     channel = TimingChannel(DenseSynchronizer(20), errors=True).set_output(transform="pandas")

@@ -89,17 +89,11 @@ def test_callbacks_follow_every_fit_and_change_no_bit(estimator):
     assert bits(plain, X) == expected
 
 
-@pytest.mark.parametrize(
-    ("estimator", "where"),
-    [
-        *((LinearSynchronizer(), where) for where in ("setup", "first task", "middle")),
-        *((DenseSynchronizer(), where) for where in ("setup", "first task", "middle")),
-    ],
-    ids=by_name,
-)
-def test_a_callback_that_raises_stops_the_fit(estimator, where):
+@pytest.mark.parametrize("where", ["setup", "first task", "middle"])
+def test_a_callback_that_raises_stops_the_fit(where):
     """The earlier fit is as it was."""
-    X, all_of_it = data_for(estimator), Recorder()
+    estimator, all_of_it = DenseSynchronizer(), Recorder()
+    X = data_for(estimator)
     clone(estimator).set_callbacks(all_of_it).fit(X[1:])
     fitted = clone(estimator).fit(X)
     expected, attributes = bits(fitted, X), vars(fitted).keys() | {"_skl_callbacks"}
