@@ -49,7 +49,7 @@ from estimators import (
 from shift_synchronizer import ShiftSynchronizer
 
 # Of few frames, so that the checks take less time.
-OF_FEW_FRAMES = ActionClassifier(n_landmarks=30, n_frames=2)
+OF_FEW_FRAMES = ActionClassifier(n_landmarks=10, n_frames=2)
 # FrameWise is as wide as its transformer: tests/transformers/test_framewise.py checks several.
 # The instances of TimingChannel have the same interface, of which one is enough.
 OTHERWISE = [*BODY, *all_of("FrameWise", "ActionClassifier"), *INSTANCES["TimingChannel"][1:]]

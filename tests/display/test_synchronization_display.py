@@ -115,11 +115,6 @@ def test_axes_of_the_user(bunch, pipe):
         display.plot(plt.figure().add_axes([0, 0, 1, 1]))
 
 
-def test_estimator_without_synchronizer_is_refused(bunch, pipe):
-    with pytest.raises(ValueError, match=r"no synchronizer in Pipeline; its steps are \['Dir"):
-        SynchronizationDisplay.from_estimator(pipe[:2], bunch.data)
-
-
 def test_units_of_the_synchronization_display(bunch, pipe):
     lengths = np.array([len(x) for x in bunch.data])
     times = pipe[2].match(pipe[:2].transform(bunch.data)).times

@@ -167,14 +167,14 @@ def test_rate_and_noise_hardly_matter_on_people(ruler, real_data):
     """Twelve walks: 30 frames a second, and a centimetre of noise."""
     (label, metres) = ruler.PEOPLE["cmu07_walk"]
     bunch = ruler.load_trials(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    walks = [metres * np.asarray(x, dtype=float) for x in bunch.data]
+    whole = [ruler.find(x, 60, bunch.skeleton) for x in walks]
     for rate, noise, most in ((30, 0, 5), (None, 0.01, 12)):
         triples = []
-        for k, x in enumerate(bunch.data):
-            x = metres * np.asarray(x, dtype=float)
-            whole = ruler.find(x, 60, bunch.skeleton)
+        for k, x in enumerate(walks):
             x = x + np.random.default_rng(k).normal(0, noise, x.shape)
             triples.append(
-                ruler.compare(ruler.find(*ruler.thinned(x, 60, rate), bunch.skeleton), whole)
+                ruler.compare(ruler.find(*ruler.thinned(x, 60, rate), bunch.skeleton), whole[k])
             )
         for label in LABELS:
             off = 1000 * np.concatenate([np.array(e[label]) for e, *_ in triples])

@@ -134,12 +134,12 @@ def test_a_detector_tells_what_recordings_alone_show(bends):
 
 
 def test_pauses_of_real_people_are_told(hdm05):
-    """Hops of four people, each left out: a pause in the middle, and the hops as they are."""
+    """Hops of two people, each left out: a pause in the middle, and the hops as they are."""
     is_hop = hdm05.target == "hopBothLegs1hops"
     X = [x for x, of_action in zip(hdm05.data, is_hop, strict=True) if of_action]
     actors, skeleton = hdm05.actor[is_hop], hdm05.skeleton
     found = {"paused": [], "right": []}
-    for actor in np.unique(actors):
+    for actor in np.unique(actors)[::2]:
         known = [x for x, a in zip(X, actors, strict=True) if a != actor]
         pipe = make_pipeline(DirectionCosines(skeleton), DenseSynchronizer(60), ActionModel())
         pipe.fit(known, actionmodel__groups=actors[actors != actor])

@@ -182,7 +182,6 @@ BAD = {
     "falling": (lambda K: [*K[:2], K[2][::-1], *K[3:]], "Trial 2: .* increasing"),
     "first frame": (lambda K: [[0.0, 9.0], *K[1:]], "Trial 0: .* both excluded"),
     "outside": (lambda K: [*K[:8], [10.0, 1e4]], "Trial 8: .* between 0 and"),
-    "in seconds": (lambda K: K / 1000, "Trial 0: .* look like seconds"),
     "none known": (lambda K: K * [1, np.nan], "key-frame 1 is known in no trial"),
     "no column": (lambda K: K[:, :0], "must be some increasing frames"),
     "no row": (lambda K: [None] * 9, "a key-frame is known in no trial"),

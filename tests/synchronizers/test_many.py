@@ -98,13 +98,13 @@ def test_paths_of_long_trials_take_little_memory():
 
 
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
-@pytest.mark.parametrize(("settings", "n_jobs"), [({}, 2), ({"pattern": 3}, None), (PAPER, None)])
-def test_portions_change_nothing(monkeypatch, settings, n_jobs):
+@pytest.mark.parametrize("settings", [{}, {"pattern": 3}, PAPER])
+def test_portions_change_nothing(monkeypatch, settings):
     X = walks(26, 20, dtype=np.float32)
     monkeypatch.setattr(median, "MOST_REFERENCES", 20)
     expected = DenseSynchronizer(**settings).fit(X)
     monkeypatch.setattr(learning, "PORTION_CELLS", 5_000)
-    sync = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
+    sync = DenseSynchronizer(**settings).fit(X)
     assert sync.pattern_index_ == expected.pattern_index_
     assert sync.mu_ == expected.mu_
     # Single precision: products of one base and of several may round differently.

@@ -34,7 +34,7 @@ def test_single_actions_are_not_cyclic(cycles, read):
     for archive, labels in cycles.SINGLE.items():
         for label in labels:
             bunch = read(archive, label)
-            takes = bunch.data[::3]
+            takes = bunch.data[::6]
             assert not CycleSegmenter(bunch.skeleton).report(takes)["cyclic"].any(), label
     bunch = read("hdm05", "sneak2StepsLStart")
     with pytest.raises(ValueError, match=r"Trial 0: (not cyclic|holds)"):
@@ -45,9 +45,9 @@ def test_single_actions_are_not_cyclic(cycles, read):
 def test_walks_of_too_few_cycles_are_rejected(n_cycles, read):
     """Walks that are cut short, at 30 and at 60 frames per second."""
     bunch = read("cmu07_walk", "walk")
-    segmenter = CycleSegmenter(bunch.skeleton)
-    periods = segmenter.report(bunch.data)["period"]
-    short = [x[-round(n_cycles * p) :] for x, p in zip(bunch.data, periods, strict=True)]
+    segmenter, walks = CycleSegmenter(bunch.skeleton), bunch.data[::2]
+    periods = segmenter.report(walks)["period"]
+    short = [x[-round(n_cycles * p) :] for x, p in zip(walks, periods, strict=True)]
     slow = [x[::2] for x in short]
     for X in (short, slow):
         assert (segmenter.report(X)["cyclic"] == (n_cycles > 1.6)).mean() > 0.95
