@@ -359,15 +359,6 @@ def test_inverse_transform_takes_pandas_output(trials):
             fitted.inverse_transform(points[points.columns[::-1]])
 
 
-def test_pandas_output_keeps_the_labels(trials):
-    X = to_frame(trials, trials=list("abcdef"), columns=NAMES)
-    out = ASpace(2).set_output(transform="pandas").fit_transform(X)
-    assert out.index.equals(X.index)
-    out = DenseSynchronizer(n_frames=20).set_output(transform="pandas").fit_transform(X)
-    assert list(out.index.unique(0)) == list("abcdef")
-    assert list(out.loc["b"].index) == list(range(20))
-
-
 @pytest.mark.parametrize("estimator", BODY, ids=by_name)
 def test_pandas_through_a_pipeline(estimator, trials):
     pipe = make_pipeline(clone(estimator), ASpace(), DenseSynchronizer(), ActionModel())

@@ -31,7 +31,7 @@ def only(joints, of=PAPER):
     return Skeleton(of.joints, of.parents, {j: of.landmarks[j] for j in joints}, of.up)
 
 
-@pytest.fixture(params=["made", "hdm05/hdm05", "utkinect/utkinect"], scope="module")
+@pytest.fixture(params=["made", "utkinect/utkinect"], scope="module")
 def people(request):
     if request.param == "made":
         bunch = make_bending(3, random_state=0)

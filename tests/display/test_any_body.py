@@ -49,7 +49,7 @@ def pipeline(skeleton):
 @pytest.mark.parametrize(
     ("joints", "axes"), [(LEGS, "xyz"), (ARMS, "xy"), ([*ARMS, "head"], "xyz")]
 )
-def test_any_part_is_drawn_and_animated(joints, axes):
+def test_any_part_is_drawn(joints, axes):
     X, skeleton = part_of(joints, axes)
     n_bones = len(skeleton.bones)
     display = SkeletonDisplay.from_positions(X[0], skeleton, frames=3)
@@ -62,8 +62,6 @@ def test_any_part_is_drawn_and_animated(joints, axes):
         assert display.scenes[1][0].shape == (30, len(skeleton.joints), len(axes))
         display.plot(at=0.7)
         assert len(bones_drawn(display, 1)) == 3 * n_bones
-    animation = display.animate(seconds=0.5, fps=4)
-    assert animation.to_jshtml().count("data:image/png;base64") == 2
 
 
 @pytest.mark.parametrize(("joints", "axes"), [(LEGS, "xyz"), (HALF, "xy")])
@@ -107,8 +105,7 @@ def test_positions_in_a_plane_are_not_turned():
         np.testing.assert_allclose(head, body[PAPER.joints.index("head")])
 
 
-@pytest.mark.parametrize("name", ["openpose", "coco", "mediapipe", "kinect_v2", "opencap",
-                                  "plug_in_gait", "optitrack", "unreal"])  # fmt: skip
+@pytest.mark.parametrize("name", ["openpose", "coco", "mediapipe", "plug_in_gait", "unreal"])
 @pytest.mark.parametrize("n_dims", [3, 2])
 def test_every_format_is_drawn(name, n_dims):
     skeleton = getattr(Skeleton, name)(n_dims=n_dims)

@@ -231,7 +231,7 @@ def test_animation_plays_from_the_first_to_the_last_frame(bunch, pipe, monkeypat
 def test_animation_on_axes_of_the_user(bunch, pipe):
     figure, axes = plt.subplots(2, 1)
     display = SkeletonDisplay.from_estimator(pipe, bunch.data, trials=[0, 1], ax=axes)
-    animation = display.animate(seconds=0.5, fps=4)
+    animation = display.animate(seconds=0.2, fps=5)
     assert display.axes_ == list(axes)
     assert all(len(axis.collections) == 4 for axis in axes), "the still figures are still there"
     assert plt.fignum_exists(figure.number)

@@ -1,10 +1,8 @@
 """write_player: positions, warps and marks in the page, decoded by other means; what is refused."""
 
 import base64
-import json
 import re
 import struct
-from html.parser import HTMLParser
 
 import numpy as np
 import pandas as pd
@@ -14,31 +12,10 @@ from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Match, Skele
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.report import player, write_player
 
+from pages import Page
+
 BENDS = make_bending(5, n_frames=40, random_state=0)
 PIPE = make_pipeline(DirectionCosines(BENDS.skeleton), DenseSynchronizer(31)).fit(BENDS.data)
-# Elements without an end.
-VOID = {"meta", "input", "link", "img", "br", "hr"}
-
-
-class Elements(HTMLParser):
-    """The elements of a page, each of which must end within the one that it began in."""
-
-    def __init__(self, path):
-        super().__init__()
-        self.page, self.tags, self.ids, self._open = path.read_text(encoding="utf-8"), [], [], []
-        self.feed(self.page)
-        self.close()
-        assert self._open == []
-        self.data = json.loads(re.search(r'id="data">(.*?)</script>', self.page, re.DOTALL)[1])
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append((tag, dict(attributes)))
-        self.ids += [value for name, value in attributes if name == "id"]
-        if tag not in VOID:
-            self._open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self._open.pop() == tag
 
 
 def whole_numbers(text, code):
@@ -56,7 +33,8 @@ def positions_of(data):
 
 
 def write(tmp_path, X=BENDS.data, skeleton=BENDS.skeleton, **given):
-    return Elements(write_player(tmp_path / "a.html", X, skeleton, **given))
+    path = write_player(tmp_path / "a.html", X, skeleton, **given)
+    return Page(path.read_text(encoding="utf-8"))
 
 
 # -- what the page holds ----------------------------------------------------------------------
@@ -100,9 +78,10 @@ def test_positions_are_those_given(tmp_path):
 def test_the_page_is_one_file_that_needs_nothing(tmp_path):
     for page in (write(tmp_path), write(tmp_path, match=PIPE, keyframes=[[3]] * 5)):
         assert "://" not in page.page
-        assert len(set(page.ids)) == len(page.ids)
+        ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+        assert len(set(ids)) == len(ids)
         used = set(re.findall(r'find\("(\w+)"\)', page.page))
-        assert used <= set(page.ids)
+        assert used <= set(ids)
         for tag, attributes in page.tags:
             assert tag not in ("link", "iframe", "img", "object", "embed")
             assert not {"src", "href"} & set(attributes)

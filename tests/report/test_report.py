@@ -2,12 +2,10 @@
 
 import base64
 import io
-import json
 import os
 import re
 import sys
 from html import escape
-from html.parser import HTMLParser
 from operator import itemgetter
 from unittest.mock import Mock
 
@@ -31,6 +29,8 @@ from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.io import write_motion
 from sklearn_motionsync.report import page, player, report, write_player, write_report
 
+from pages import Page
+
 GAIT = make_gait(8, 2, timing=8, random_state=0)
 TRIALS = [pd.DataFrame(x, columns=GAIT.feature_names) for x in GAIT.data]
 for k, x in enumerate(TRIALS):
@@ -45,33 +45,12 @@ LINEAR = LinearSynchronizer(20).fit(TRIALS)
 pytestmark = pytest.mark.usefixtures("without_pictures")
 
 
-class Text(HTMLParser):
-    """What a page shows: its text, its tags, its tables, and the text in place of images."""
+class Text(Page):
+    """A report: its headings, its files, and its tables."""
 
     def __init__(self, path):
-        super().__init__()
-        self.page = path.read_text(encoding="utf-8")
-        self.shown, self.tags, self.images, self._within = [], [], [], []
-        self.feed(self.page)
-        self.close()
-        self.text = " ".join(" ".join(self.shown).split())
-        json_text = re.search(r'id="data">(.*?)</script>', self.page, re.DOTALL)[1]
-        self.data = json.loads(json_text)
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append((tag, dict(attributes)))
-        if tag == "img":
-            self.images.append(dict(attributes))
-        if tag in ("script", "style"):
-            self._within.append(tag)
-
-    def handle_endtag(self, tag):
-        if tag in ("script", "style"):
-            self._within.pop()
-
-    def handle_data(self, data):
-        if not self._within:
-            self.shown.append(data)
+        super().__init__(path.read_text(encoding="utf-8"))
+        self.images = [attributes for tag, attributes in self.tags if tag == "img"]
 
     @property
     def headings(self):

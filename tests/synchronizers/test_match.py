@@ -155,17 +155,6 @@ def test_match_copies_given_times():
     assert not match.offsets.any()
 
 
-def test_warp_gives_the_same_as_transform_for_every_kind_of_collection(matched):
-    points, synchronizer, match = matched
-    expected = synchronizer.transform(points)
-    names = ["a", "b", "c"]
-    frames = [pd.DataFrame(x, columns=names) for x in points]
-    objects = np.empty(6, dtype=object)
-    objects[:] = points
-    for X in (points, frames, to_frame(frames), objects):
-        np.testing.assert_array_equal(match.warp(X), expected)
-
-
 @pytest.mark.parametrize(
     ("gap", "frame"), [(np.nan, 0), (np.nan, 5), (np.nan, 9), (np.inf, 8), (-np.inf, 5)]
 )
