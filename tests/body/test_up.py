@@ -107,7 +107,7 @@ def test_up_is_estimated_unless_given(up, joints, recording):
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
 def test_up_of_people_is_estimated(real_data, name):
     bunch = load_trials(real_data / f"{name}_positions.npz")
-    for x in bunch.data[::2]:
+    for x in bunch.data[::4]:
         df = columns_of(raised(x.astype(float), "-z"), bunch.skeleton)
         assert Skeleton.from_frame(df).up == "-z"
 
@@ -119,7 +119,7 @@ def test_up_of_upper_bodies_is_right_or_in_doubt(real_data, name):
     given = dict.fromkeys(PAPER.joints)
     given |= {at: bunch.skeleton.landmarks[at] for at in ("pelvis", "neck", "head", *arms)}
     right = 0
-    X = bunch.data[::3]
+    X = bunch.data[::6]
     for x in X:
         assert Skeleton.from_frame(columns_of(x, bunch.skeleton), landmarks=given).up == "y"
         df = columns_of(raised(x, "-z"), bunch.skeleton)
@@ -165,6 +165,6 @@ def test_parts_of_people_are_accepted_and_upside_down_refused(real_data, name):
         known = {j: bunch.skeleton.landmarks[j] for j in landmarks}
         some = Skeleton(bunch.joints, bunch.skeleton.parents, known)
         fitted = DirectionCosines(some).fit(bunch.data)
-        for x in bunch.data[::3] if all_tell else bunch.data[:1]:
+        for x in bunch.data[::6] if all_tell else bunch.data[:1]:
             with pytest.raises(ValueError, match="upside down"):
                 fitted.transform([turned_over(x)])

@@ -192,20 +192,15 @@ def check_bands(display, match, *args):
         np.testing.assert_allclose(found, band(display.pattern_[0].get_xdata(), *bounds))
 
 
-def test_bands_are_the_intervals_of_the_match(bunch, pipe):
-    match = Match.from_estimator(pipe, bunch.data)
+def test_bands_are_the_intervals_of_the_match_in_any_unit(bunch, pipe):
+    match, given = Match.from_estimator(pipe, bunch.data), {"features": 0, "frame_rate": 50}
+    for unit in ("percent", "seconds"):
+        display = SynchronizationDisplay.from_estimator(pipe, bunch.data, unit=unit, **given)
+        check_bands(display, match, unit, bunch.data, 50)
     display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0)
     check_bands(display, match)
     assert display.axes_[-1].get_title().endswith("shaded: 90 % intervals")
     assert display.intervals_.get_zorder() < display.offsets_.get_zorder()
-
-
-def test_bands_have_the_unit_of_the_offsets(bunch, pipe):
-    match, seconds = Match.from_estimator(pipe, bunch.data), {"unit": "seconds", "frame_rate": 50}
-    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0, unit="percent")
-    check_bands(display, match, "percent")
-    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, **seconds)
-    check_bands(display, match, "seconds", bunch.data, 50)
 
 
 def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):

@@ -40,8 +40,12 @@ def points(bunch):
     return ASpace(3).fit_transform(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
 
 
-def steps(bunch, *last):
-    return make_pipeline(DirectionCosines(bunch.skeleton), ASpace(3), *last)
+@pytest.fixture(scope="module")
+def pipes(bunch):
+    """Of a channel and of its synchronizer, fitted."""
+    steps, sync = (DirectionCosines(bunch.skeleton), ASpace(3)), DenseSynchronizer(30)
+    made = (make_pipeline(*steps, each, ActionModel()) for each in (TimingChannel(sync), sync))
+    return [pipe.fit(bunch.data) for pipe in made]
 
 
 @pytest.mark.parametrize("errors", [False, True])
@@ -114,10 +118,8 @@ def test_keyframes_are_routed_by_name_and_by_request(bunch):
             TimingChannel(asking).fit_transform(X, moments=[1])
 
 
-def test_scorers_and_displays_find_the_synchronizer(bunch):
-    pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
-    plain = steps(bunch, DenseSynchronizer(30), ActionModel()).fit(bunch.data)
-    X = bunch.data
+def test_scorers_and_displays_find_the_synchronizer(bunch, pipes):
+    (pipe, plain), X = pipes, bunch.data
     np.testing.assert_array_equal(
         Match.from_estimator(pipe, X).times, Match.from_estimator(plain, X).times
     )
@@ -132,12 +134,11 @@ def test_scorers_and_displays_find_the_synchronizer(bunch):
     assert (detector.predict(X) == 1).all()
 
 
-def test_model_displays_show_the_channel_beside_poses(bunch):
-    pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
+def test_model_displays_show_the_channel_beside_poses(bunch, pipes):
+    pipe, plain = pipes
     display = ActionModelDisplay.from_estimator(pipe, bunch.data)
     assert display.ylabels == ["aspace0", "aspace1", "aspace2", "offset"]
     features = ["offset", "pelvis_height"]
-    plain = steps(bunch, DenseSynchronizer(30), ActionModel()).fit(bunch.data)
     for band in ("points", "trials"):
         display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features, band=band)
         offsets = Match.from_estimator(pipe, bunch.data).offsets_in("percent")
