@@ -213,7 +213,6 @@ def test_key_frames_reach_a_step_before_the_synchronizer(few):
 
 
 def run_example(monkeypatch, capsys, *arguments):
-    mpl.use("Agg")
     monkeypatch.setattr(sys, "argv", [str(EXAMPLE), *map(str, arguments)])
     runpy.run_path(str(EXAMPLE), run_name="__main__")
     return capsys.readouterr().out

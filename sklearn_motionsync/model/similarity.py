@@ -355,9 +355,9 @@ def warn_of_reference(is_refused):
     if is_refused.mean() > 0.5:
         refused = ", ".join(map(str, np.flatnonzero(is_refused)))
         warnings.warn(
-            f"Of the reference, {counted(int(is_refused.sum()), 'trial')} of {len(is_refused)} would "
-            f"be refused without one (numbers {refused}). What is like them is accepted: give right "
-            "trials of the person, or no reference.",
+            f"Of the reference, {counted(int(is_refused.sum()), 'trial')} of {len(is_refused)} "
+            f"would be refused without one (numbers {refused}). What is like them is accepted: "
+            "give right trials of the person, or no reference.",
             SynchronizationWarning,
             stacklevel=3,
         )

@@ -1,6 +1,5 @@
 """GaitDisplay: what is drawn is what gait_events finds."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -27,7 +26,6 @@ def test_lines_and_bars_are_at_the_events(walk):
         np.testing.assert_allclose(begins, strikes["time"])
         whole = [length for begin, length in spans if 0 < begin < strikes["time"].iloc[-1]]
         np.testing.assert_allclose(whole, 0.68, atol=0.08)
-    plt.close(shown.figure_)
 
 
 def test_heights_are_above_the_floor_in_metres(walk):
@@ -38,7 +36,6 @@ def test_heights_are_above_the_floor_in_metres(walk):
     heel = shown.heights["left_heel"]
     assert heel.min() >= 0
     assert 0.1 < heel.max() < 0.35
-    plt.close(shown.figure_)
 
 
 def test_refused(walk):
@@ -53,4 +50,3 @@ def test_events_of_the_user_are_drawn(walk):
     )
     assert shown.axes_[-1].get_xlabel() == "since the start (s)"
     assert repr(shown) == "GaitDisplay(2 strikes, 1 foot-off)"
-    plt.close(shown.figure_)

@@ -1,6 +1,5 @@
 """GroupDisplay: means, bands, offsets, events and clusters of people, in true units."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -29,12 +28,6 @@ def pipe():
 @pytest.fixture(scope="module")
 def found(pipe):
     return compare_groups(pipe, TRIALS, **GIVEN, n_permutations=199)
-
-
-@pytest.fixture(autouse=True)
-def close():
-    yield
-    plt.close("all")
 
 
 def means_of_people(values, group):

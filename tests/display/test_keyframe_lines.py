@@ -1,6 +1,5 @@
 """Key-frames in figures: where they are drawn, and by what name."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -52,7 +51,6 @@ def test_lines_on_the_clock_and_ticks_of_trials(sync, unit, scale):
     own = (K.to_numpy().T * of_unit).T
     ticks = [segment[0, 0] for segment in display.own_keyframes_[0].get_segments()]
     np.testing.assert_allclose(ticks, own[np.isfinite(own)])
-    plt.close("all")
 
 
 def test_ticks_have_the_colours_of_groups(sync):
@@ -62,7 +60,6 @@ def test_ticks_have_the_colours_of_groups(sync):
     (ticks,) = display.own_keyframes_
     np.testing.assert_array_equal(ticks.get_colors()[:, :3], curves[[0, 0, 2, 2, 3, 3, 4, 4, 5, 5]])
     assert texts(display.axes_[1]) == ["force peak", "Foot Off, Right"]
-    plt.close("all")
 
 
 def test_key_frames_that_trials_lack_are_lines_without_names(sync):
@@ -72,7 +69,6 @@ def test_key_frames_that_trials_lack_are_lines_without_names(sync):
     assert texts(display.axes_[-1]) == []
     plain = DenseSynchronizer(61).fit(X)
     assert SynchronizationDisplay.from_estimator(plain, X, features=0).keyframes_ == []
-    plt.close("all")
 
 
 def test_the_model_of_a_pipeline_shows_them(sync):
@@ -89,4 +85,3 @@ def test_the_model_of_a_pipeline_shows_them(sync):
         places(lines) for lines in display.keyframes_
     ]
     assert ActionModelDisplay.from_estimator(pipe[1]).keyframes_ == []
-    plt.close("all")

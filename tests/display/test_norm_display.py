@@ -1,6 +1,5 @@
 """NormDisplay: the subject, the norm and the departures are those of the comparison."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from artists import segments, texts
@@ -17,12 +16,6 @@ def found():
     norm = [x for x, group in zip(GAIT.data, GAIT.group, strict=True) if group == "A"]
     sync = DenseSynchronizer(51).fit(norm)
     return compare_to_norm(sync, GAIT.data, GAIT.group, norm="A", groups=GAIT.person, level=0.2)
-
-
-@pytest.fixture(autouse=True)
-def close():
-    yield
-    plt.close("all")
 
 
 def test_lines_and_bands_are_those_of_the_comparison(found):

@@ -1,6 +1,5 @@
 """Every figure fits on a phone: it is narrow, and none of its text is cut or hidden."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.text import Text
@@ -134,4 +133,3 @@ def test_new_figures_are_narrow_and_show_all_their_text(pipe, poses, kind):
             assert box.x1 <= inner.x1, text
             assert inner.y0 <= box.y0, text
             assert box.y1 <= inner.y1, text
-    plt.close(figure)

@@ -1,13 +1,10 @@
 """SearchDisplay: its artists agree with the hits."""
 
-import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import to_trials
 from sklearn_motionsync.display import SearchDisplay
-
-matplotlib.use("Agg")
 
 WAVE = np.column_stack([np.sin(np.linspace(0, 6, 40)), np.sin(np.linspace(0, 9, 40))])
 TAKE = np.concatenate([np.zeros((30, 2)), WAVE, np.zeros((50, 2)), 0.2 * WAVE, np.zeros((40, 2))])

@@ -30,11 +30,10 @@ def test_each_page_says_what_one_gets_and_shows_what_fails(path):
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_figures_are_narrow_and_have_titles(name, monkeypatch, capsys):
+def test_figures_are_narrow_and_have_titles(name, monkeypatch):
     path = ROOT / "examples" / f"{name}.py"
     monkeypatch.setattr(sys, "argv", [str(path)])
     monkeypatch.setattr(plt, "show", lambda: None)
-    plt.close("all")
     exec(compile(path.read_text(encoding="utf-8"), path, "exec"), {"__name__": "__main__"})
     figures = [plt.figure(number) for number in plt.get_fignums()]
     assert figures
@@ -42,8 +41,6 @@ def test_figures_are_narrow_and_have_titles(name, monkeypatch, capsys):
         assert figure.get_size_inches()[0] <= LARGEST_WIDTH
         titles = [figure.get_suptitle(), *(axes.get_title() for axes in figure.axes)]
         assert any(title.strip() for title in titles)
-    capsys.readouterr()
-    plt.close("all")
 
 
 def test_the_gallery_has_the_order_of_its_index(monkeypatch):

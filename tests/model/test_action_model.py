@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.stats import norm
-from sklearn_motionsync import ActionModel
+from sklearn_motionsync import ActionModel, SynchronizationWarning
 
 
 @pytest.fixture(scope="module")
@@ -128,3 +128,16 @@ def test_accepts_refuses_invalid_poses(model, poses):
 def test_sample_refuses_invalid_numbers(model, n):
     with pytest.raises(ValueError, match="whole number of samples"):
         model.sample(n)
+
+
+# -- groups -----------------------------------------------------------------------------
+
+
+def test_conditions_in_the_place_of_people_are_told():
+    X = np.random.default_rng(0).standard_normal((40, 20, 2)).cumsum(axis=1)
+    condition, person = ["before", "after"] * 20, np.arange(40) // 4
+    with pytest.warns(SynchronizationWarning, match="groups names two people for 40 trials"):
+        wide = ActionModel().fit(X, groups=condition)
+    assert ActionModel().fit(X, groups=person).threshold_ < wide.threshold_
+    with pytest.raises(ValueError, match="the same 2 sets of trials apart as y"):
+        ActionModel().fit(X, condition, groups=condition)

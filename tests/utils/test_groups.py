@@ -35,7 +35,6 @@ PARTS = PartSynchronizer({"arm": [0]}, synchronizer=DenseSynchronizer(10)).fit(X
 SYNC = LinearSynchronizer(10).fit(X)
 PIPE = make_pipeline(LinearSynchronizer(10), ActionModel()).fit(X)
 EVENTS = [[k + 3, 15] for k in range(N)]
-BEFORE, AFTER, TIMES = [np.zeros((10, 1))] * N, np.zeros((N, 10, 1)), np.zeros((N, 10))
 
 
 def first_of(labels):
