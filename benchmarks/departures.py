@@ -1,6 +1,6 @@
 """What `find_departures` says of faults that were put into trials of people held out.
 
-    python benchmarks/departures.py DATA_FOLDER [hdm05] [uiprmd]
+    python benchmarks/departures.py DATA_FOLDER [hdm05] [uiprmd] [whole] [whole_unseen]
 
 DATA_FOLDER holds hdm05/hdm05_positions.npz and uiprmd/uiprmd_odd_positions.npz. Every subject of
 each class is held out in turn; everything is learnt from right trials of the others. Three trials
@@ -9,7 +9,9 @@ fault. A limb is turned about its upper joint, with all below it. Eight kinds: o
 degrees off in 40 % of the time, a forearm or shank 30, the trunk 20; a limb late by 12 % of the
 time, or with 0.5 or 1.6 times its amplitude. What is judged is the most important row, whatever its
 evidence; overlap is that of the time, of faults with the right region. Choices were made on HDM05
-and these two exercises of UI-PRMD. Prints Markdown, in per cent.
+and these two exercises of UI-PRMD. The tables of whole bodies have trials that pause, start late,
+stop early or move too little as a whole, also of two exercises that nothing was chosen on. Prints
+Markdown, in per cent.
 """
 
 from pathlib import Path
@@ -35,7 +37,7 @@ from sklearn_motionsync.model import find_departures
 
 P = 60
 BODY = Skeleton.paper()
-CHOSEN = ("inline lunge", "shoulder rotation")
+CHOSEN, UNSEEN = ("inline lunge", "shoulder rotation"), ("deep squat", "sit to stand")
 # Most trials of a subject that get faults.
 SPOILT = 4
 # Upper and lower joint, what is below the lower one, and the part of the body.
@@ -305,9 +307,49 @@ def fault_table(title, classes):
         print_row(way, [*cells, percent(faults["rare"].mean()), percent(right["rare"].mean(), 1)])
 
 
+# -- whole bodies -----------------------------------------------------------------------
+
+
+def spoil_whole(x, kind):
+    """A trial that is held for a fifth of its time, or is half as large."""
+    if kind == "too small":
+        return x.mean(axis=0) + 0.5 * (x - x.mean(axis=0))
+    frame = {"starts late": 0, "pauses": len(x) // 2, "stops early": len(x) - 1}[kind]
+    held = np.repeat(x[frame : frame + 1], len(x) // 4, axis=0)
+    return np.concatenate([x[:frame], held, x[frame:]])
+
+
+def whole_table(title, classes):
+    """How often a row of the whole body has the kind that was put in; and any, of right trials."""
+    kinds, told = ("starts late", "pauses", "stops early", "too small"), []
+    for trials in classes:
+        for fold in folds(trials):
+            pipe = make_pipeline(DirectionCosines(BODY), DenseSynchronizer(P), ActionModel())
+            pipe.fit(fold.training, actionmodel__groups=fold.groups)
+            for kind in kinds:
+                table = find_departures(pipe, [spoil_whole(x, kind) for x in fold.tested[:6]])
+                is_so = table["trial"][(table["kind"] == kind) & (table["limb"] == "whole body")]
+                told += [{kind: i in set(is_so)} for i in range(len(fold.tested[:6]))]
+            table = find_departures(pipe, fold.tested)
+            of_whole, rare = table["limb"] == "whole body", table["rare"]
+            for name, rows in (("any, untouched", of_whole), ("rare, untouched", of_whole & rare)):
+                wrong = set(table["trial"][rows])
+                told += [{name: i in wrong} for i in range(len(fold.tested))]
+    shares = pd.DataFrame(told).mean()
+    print_head(title, list(shares.index))
+    print_row("told", [percent(share, 1) for share in shares])
+
+
 TABLES = {
     "hdm05": lambda folder: fault_table("HDM05", classes_of_hdm05(folder)),
     "uiprmd": lambda folder: fault_table(" and ".join(CHOSEN), exercises_of_uiprmd(folder, CHOSEN)),
+    "whole": lambda folder: whole_table(
+        "HDM05 and " + " and ".join(CHOSEN),
+        [*classes_of_hdm05(folder), *exercises_of_uiprmd(folder, CHOSEN)],
+    ),
+    "whole_unseen": lambda folder: whole_table(
+        " and ".join(UNSEEN), exercises_of_uiprmd(folder, UNSEEN)
+    ),
 }
 
 if __name__ == "__main__":
