@@ -100,8 +100,8 @@ def find_departures(
           ``"backwards"``; a detector also tells ``"too fast"``, ``"too slow"``, ``"on the other
           side"``, ``"with the other arm"``, and ``"another movement"`` where nothing else is known.
         - ``limb``, such as ``"left_forearm"``, and ``region``, such as ``"left arm"`` or
-          ``"trunk"``; ``"whole body"`` in both, which is sought where a synchronizer stands before
-          the model and ``features`` are not given; None of other features.
+          ``"trunk"``; None of other features. ``"whole body"`` in both is sought where there is a
+          synchronizer before the model, and no `ASpace`, and ``features`` are not given.
         - ``direction``: where the limb points instead, in the axes of its parent: ``"flexed"`` or
           ``"extended"`` of forearms, legs and thighs, ``"abducted"`` or ``"adducted"``,
           ``"raised"`` or ``"lowered"``, ``"forward"`` or ``"backward"``, ``"to the left"`` or
@@ -376,10 +376,11 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     faults = [[] for _ in range(n)]
     for i in sought:
         faults[i] = finder.find(converted[i], None if later is None else later[i])
-    of_whole = expected.faults_of_whole(view)
+    of_whole = expected.faults_of_whole(converted, later)
     if reference is not None:
         # What the person does in most right trials is no fault.
-        usual = expected.faults_of_whole(theirs)
+        converted_of_person = expected.space.convert(of_person)
+        usual = expected.faults_of_whole(converted_of_person, of_person_in_time)
         kinds = [fault.kind for faults_of_one in usual for fault in faults_of_one]
         is_usual = {kind: kinds.count(kind) > len(usual) / 2 for kind in kinds}
         of_whole = [[f for f in of_one if not is_usual.get(f.kind)] for of_one in of_whole]
@@ -453,8 +454,7 @@ class _Expected:
         self.training = view.training[..., chosen].astype(np.float64)
         self.mean, self.std = view.model.mean_[:, chosen], view.predicted[:, chosen]
         self.left_out = view.residual_variance[chosen]
-        examples, self._width, self._finder = view.in_linear_time, 0, None
-        self._examples = self._linear = None
+        examples, self._width, self._linear, self._finder = view.in_linear_time, 0, None, None
         if examples is not None and not _is_linear(synchronizer):
             # Features that come last are unknown in linear time, such as a `TimingChannel`.
             self._width = int((chosen < examples.shape[2]).sum())
@@ -464,12 +464,12 @@ class _Expected:
             whose = view.model_of_points.groups_
             if not len(examples) == len(whose) == view.model_of_points.n_samples_seen_:
                 whose = np.arange(len(examples))
-            examples = padded[..., chosen]
-            self._examples = self._known_in_time(examples), whose
-            examples = with_residuals(examples, whose, self.left_out)
+            examples = with_residuals(padded[..., chosen], whose, self.left_out)
             self._linear = self._known_in_time(examples), whose
-        # Only what has a time of its own, and a body, starts late or pauses.
-        self._has_body = features is None and synchronizer is not None
+        # Only what has a time of its own starts late or pauses. In an aSpace new people do: what
+        # they begin with is left out.
+        in_aspace = view.route.aspace is not None
+        self._has_body = features is None and synchronizer is not None and not in_aspace
 
     @cached_property
     def whole_body(self):
@@ -478,16 +478,13 @@ class _Expected:
             return None
         coverage = 1 - (1 - self.view.model.coverage) / _N_OF_WHOLE
         on_clock, groups = self.space.convert(self.training), self.view.model.groups_
-        in_time = (on_clock, groups) if self._examples is None else self._examples
+        in_time = (on_clock, groups) if self._linear is None else self._linear
         return WholeBody(*in_time, on_clock[..., : in_time[0].shape[2]], groups, coverage)
 
-    def faults_of_whole(self, view):
-        """The faults of the whole trials of a view, a list of each; an aSpace has no residuals."""
+    def faults_of_whole(self, on_clock, in_time):
+        """The faults of whole trials (n, P, n_columns), a list of each."""
         if self.whole_body is None:
-            return [[] for _ in view.labels]
-        filled = self.filled(view.synchronised)
-        on_clock = self.space.convert(filled)
-        in_time = self.in_linear_time(filled, view.curves.match)
+            return [[] for _ in on_clock]
         in_time = on_clock if in_time is None else in_time
         pairs = zip(in_time, on_clock[..., : in_time.shape[2]], strict=True)
         return [self.whole_body.find(*pair) for pair in pairs]
