@@ -51,7 +51,7 @@ class _SynchronizerScorer(BaseEstimator):
             Present for API consistency.
         **params : dict
             Metadata of the synchronizer's ``match``, and of its ``fit`` where the scorer fits it
-            anew, such as ``keyframes``; in cross-validation requested by `set_score_request`.
+            anew, such as ``keyframes``; in cross-validation by ``set_score_request``.
 
         Returns
         -------

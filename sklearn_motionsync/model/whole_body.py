@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
-from ..matching.counting import first_largest, runs_of
+from ..matching.counting import ROUNDING, first_largest, runs_of
 from ..matching.filters import smooth
 from ..utils.groups import mean_of_others
 from .acceptance import PRIOR_COUNT, LogPredictionInterval
@@ -14,6 +14,8 @@ from .acceptance import PRIOR_COUNT, LogPredictionInterval
 _SMOOTHING = 0.01
 # A movement starts, and stops, where so much of its squared speed is over, or is still to come.
 _AT_ENDS = 0.01
+# A body starts, and stops, when so many of its columns have, by what they count.
+_FEW_COLUMNS = 0.25
 # It pauses where the squared speed of its mean part is below this share of the mean.
 _SLOW = 0.02
 # Shares of the time are compared by their logarithms, with so much added; and the prior variance
@@ -152,25 +154,31 @@ class WholeBody:
 
     def _in_time(self, trial):
         """When a trial starts, how long before its end it stops, and its longest pause."""
-        done, t = self._progress(trial), np.linspace(0, 1, len(trial))
-        start, stop = np.interp([_AT_ENDS, 1 - _AT_ENDS], done, t)
+        done = np.cumsum(self._squared_speeds(trial), axis=0)
+        # Columns that never move have started, and stopped, at once.
+        done /= np.where(done[-1] > 0, done[-1], 1)
+        starts, stops = (done < _AT_ENDS).mean(axis=0), (done < 1 - _AT_ENDS).mean(axis=0)
+        # One limb that is late does not make the body late.
+        start, stop = self._quantile(starts, _FEW_COLUMNS), self._quantile(stops, 1 - _FEW_COLUMNS)
         first, last = self._pause(trial)
         return {"start": start + _ADDED, "stop": 1 - stop + _ADDED, "pause": last - first + _ADDED}
 
-    def _speeds(self, trial):
-        """Squared speeds (P,): the mean over the columns, each relative to its own mean."""
-        squares = np.square(smooth(trial[np.newaxis], _SMOOTHING * (len(trial) - 1), order=1)[0])
-        means = squares.mean(axis=0)
-        return (squares / np.where(means > 0, means, 1)) @ self._weights
+    def _squared_speeds(self, trial):
+        return np.square(smooth(trial[np.newaxis], _SMOOTHING * (len(trial) - 1), order=1)[0])
 
-    def _progress(self, trial):
-        """The share of the squared speeds up to each frame, (P,)."""
-        done = np.cumsum(self._speeds(trial))
-        return done / done[-1] if done[-1] > 0 else np.linspace(0, 1, len(trial))
+    def _quantile(self, values, share):
+        """The value that a share of the columns, by their weights, does not exceed."""
+        order = np.argsort(values, kind="stable")
+        reached = np.cumsum(self._weights[order]) >= share - ROUNDING
+        return values[order[np.flatnonzero(reached)[0]]]
 
     def _pause(self, trial):
         """Where the longest pause is, as shares of the time."""
-        speeds, done = self._speeds(trial), self._progress(trial)
+        squares = self._squared_speeds(trial)
+        means = squares.mean(axis=0)
+        # The mean over the columns, each relative to its own mean.
+        speeds = (squares / np.where(means > 0, means, 1)) @ self._weights
+        done = np.cumsum(speeds) / max(speeds.sum(), np.finfo(float).tiny)
         is_inside = (done > _AT_ENDS) & (done < 1 - _AT_ENDS)
         runs = runs_of((speeds < _SLOW * speeds.mean()) & is_inside)
         return runs[first_largest(np.diff(runs)[:, 0])] / len(trial) if len(runs) else (0.0, 0.0)
