@@ -358,7 +358,19 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
     Returns
     -------
     Judged
+
+    Raises
+    ------
+    ValueError
+        If the estimator is a classifier, or as from `view_of`.
     """
+    classifier = flat_steps(estimator)[-1]
+    if hasattr(classifier, "model_of"):
+        raise ValueError(
+            f"{caller} compares with one model, and {type(classifier).__name__} has one of each "
+            "class. Give that of a class: classifier.model_of(label), behind the steps before it, "
+            "as make_pipeline(*pipe[:-1], *pipe[-1].model_of(label))."
+        )
     expected = _Expected.of(estimator, features)
     view = expected.view.of(X, params, caller)
     n, match = len(view.labels), view.curves.match

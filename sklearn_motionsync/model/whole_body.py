@@ -28,6 +28,8 @@ _MOST_OF_COLUMN = 1.5
 # An action has a direction if its contrast is so many standard deviations, and if it and its way
 # back differ by such a share of the movement: as in `Contrast`.
 _CLEAR, _LARGE = 2, 0.1
+# A trial is backwards from this share of the usual contrast on.
+_OTHER_WAY = -0.5
 _KINDS = {
     "start": ("starts early", "starts late"),
     "stop": ("stops late", "stops early"),
@@ -147,7 +149,8 @@ class WholeBody:
             faults.append(fault)
         if self._has_direction:
             contrast = self._direction(on_clock - on_clock[::-1], self._difference)
-            if contrast < 0:
+            # A trial that stands still is like neither way.
+            if contrast < _OTHER_WAY * self._middle:
                 excess = float(1 - contrast / self._middle)
                 faults.append(WholeFault("backwards", 0.0, 1.0, np.nan, "", excess, np.inf, np.nan))
         return faults

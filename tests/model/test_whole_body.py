@@ -73,6 +73,13 @@ def test_a_pause_is_found_where_it_is(judge):
     np.testing.assert_allclose(pause.size, 20, atol=3)
 
 
+def test_standing_still_is_too_small_and_not_backwards(judge):
+    still = np.tile(rise(0.2, 0.8)[:1], (P, 1)) + 1e-9 * np.random.default_rng(0).random((P, 3))
+    kinds = [fault.kind for fault in judge.find(still, still)]
+    assert "too small" in kinds
+    assert "backwards" not in kinds
+
+
 def test_right_trials_of_new_people_have_few_faults(judge):
     told = [bool(judge.find(x, x)) for x in people(200, seed=1)[0]]
     assert np.mean(told) < 0.06

@@ -23,6 +23,7 @@ from sklearn_motionsync import (
     to_frame,
 )
 from sklearn_motionsync.datasets import load_trials, make_bending
+from sklearn_motionsync.display import SkeletonDisplay
 from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.recognition.classifier import choose_landmarks
 from sklearn_motionsync.recognition.distances import (
@@ -475,8 +476,10 @@ def test_departures_from_the_model_of_a_class(bends):
     wrong[5:12, 3 * pipe[0].skeleton.index_of("left_wrist") + 1] += 0.4
     found = find_departures(half, [wrong])
     assert found["limb"][0] == "left_forearm"
-    with pytest.raises(ValueError, match="no ActionModel in Pipeline"):
+    with pytest.raises(ValueError, match=r"find_departures compares with one model, .*model_of"):
         find_departures(pipe, [wrong])
+    with pytest.raises(ValueError, match=r"SkeletonDisplay.from_departures compares with one"):
+        SkeletonDisplay.from_departures(pipe, [wrong])
 
 
 # -- people -----------------------------------------------------------------------------
