@@ -122,8 +122,8 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
     if X is None:
         raise ValueError(f"{caller} needs trials X, whose departures are drawn; got None.")
     index = partial(as_index, trial, what="trial")
-    before, _ = split_at_synchronizer(estimator)
     judged = judge(estimator, X, params, caller, reference=reference, only=index)
+    before, _ = split_at_synchronizer(estimator)
     view, limbs = judged.view, judged.space.limbs
     if limbs is None:
         raise ValueError(
