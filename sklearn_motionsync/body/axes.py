@@ -185,7 +185,7 @@ def direction_of(name, change, expected):
     axis = int(np.argmax(np.abs(change)))
     if len(change) == 2 and axis == 0:
         return None
-    words = _WORDS.get(name.removeprefix("left_").removeprefix("right_"))
+    words = _WORDS[name.removeprefix("left_").removeprefix("right_")]
     is_mirrored = name.startswith("right_") and axis == 0
     return words[axis][int(change[axis] < 0) ^ is_mirrored]
 

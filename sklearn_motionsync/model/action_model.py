@@ -557,7 +557,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         """Draw accepted poses at a frame (Fig. 4), or whole trials.
 
         Poses are drawn about those of training trials chosen at random, and are truncated at the
-        envelope. Trials are those of new people, as far from each training trial as these are. Both
+        envelope. Trials are those of new people, about as far from training trials as these. Both
         have the mean, variance and covariance of all, so that features keep their correlations.
         Trials are accepted by `predict`; one that would be rejected is moved towards a training
         trial. Features that are directions, such as those of

@@ -84,7 +84,8 @@ def find_departures(
     limit : float, default=None
         Largest deviation that is no departure, in standard deviations. By default the evidence
         decides: two in three correct trials of new people have a fault with as much. A fault
-        also counts that exceeds `ActionModel.simultaneous_factor`.
+        also counts that exceeds `ActionModel.simultaneous_factor`. With a limit, trials have rows
+        whatever a detector says of them.
     **params : dict
         What synchronizing X takes besides, such as ``keyframes``.
 
@@ -260,7 +261,7 @@ class Judged(NamedTuple):
         if limit is None and self.refused is not None and not is_refused:
             return []
         # Rows, and how far their evidence is beyond what is rare.
-        rows, evidence = [], []
+        rows, evidence, strength = [], [], np.inf
         for fault in self.faults[i]:
             row = self._row(i, fault)
             if row is None or not abs(row.deviation) > (limit or 0):
@@ -271,8 +272,10 @@ class Judged(NamedTuple):
                 continue
             same = [r for r in rows if r.feature == row.feature and r.unit == row.unit]
             if not any(r.first <= row.peak <= r.last for r in same):
+                # The order stays in which parts were found, each without the one before.
                 rows.append(row)
-                evidence.append(min([fault.score / self.rare_score, *evidence[-1:]]))
+                strength = min(strength, fault.score / self.rare_score)
+                evidence.append(strength)
         for fault in self.of_whole[i]:
             if np.isnan(fault.deviation) or abs(fault.deviation) > (limit or 0):
                 rows.append(self._row_of_whole(i, fault))
@@ -398,7 +401,10 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
         of_whole = [[f for f in of_one if not is_usual.get(f.kind)] for of_one in of_whole]
     refused, detector = None, getattr(estimator, "best_estimator_", estimator)
     if isinstance(detector, ActionDetector):
-        with matches_of_a_fit(view.curves.known):
+        known = dict(view.curves.known)
+        if reference is not None:
+            known["reference"] = theirs.curves.known
+        with matches_of_a_fit(known):
             report = detector.report(X, reference, **params)
         refused, of_detector = report["score"].to_numpy() > 1, _of_detector(detector, report)
         of_whole = [a + b for a, b in zip(of_whole, of_detector, strict=True)]

@@ -28,6 +28,7 @@ from ..utils.pipelines import (
     accepted_params,
     flat_steps,
     matches_of_a_fit,
+    remembered_matches,
     steps_to_fit,
     takes_gaps,
 )
@@ -443,7 +444,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             whole, reached = curves.whole[..., tests.columns], curves.match.reached
             of_person = None
             if reference is not None:
-                theirs = curves_of(self.estimator_, reference, {}, caller, {})
+                known_of_theirs = remembered_matches().get("reference", {})
+                theirs = curves_of(self.estimator_, reference, {}, caller, known_of_theirs)
                 self._check_reference(reference, theirs.known, caller)
                 of_person = fill_with_mean(theirs.whole[..., tests.columns], tests.aligned.mean_)
         except MissingMetadata as error:

@@ -8,8 +8,10 @@ from scipy.stats import t as student
 from ..matching.counting import ROUNDING, first_largest, runs_of
 from ..matching.filters import smooth
 from ..utils.groups import mean_of_others
-from .acceptance import PRIOR_COUNT, LogPredictionInterval
+from .acceptance import CLEAR, LARGE, PRIOR_COUNT, LogPredictionInterval
 
+# All was chosen on HDM05 and two exercises of UI-PRMD (benchmarks/departures.py DATA whole); what
+# each is worth was measured of `_AT_ENDS` and `_FEW_COLUMNS` alone (docs/design.md).
 # Standard deviation of the Gaussian under which speeds are estimated, as a share of the time.
 _SMOOTHING = 0.01
 # A movement starts, and stops, where so much of its squared speed is over, or is still to come.
@@ -25,9 +27,6 @@ _ADDED, _PRIOR_VARIANCE = 0.2, 0.015
 _EXPLAINED = 0.35
 # The contrast of one column counts at most so often.
 _MOST_OF_COLUMN = 1.5
-# An action has a direction if its contrast is so many standard deviations, and if it and its way
-# back differ by such a share of the movement: as in `Contrast`.
-_CLEAR, _LARGE = 2, 0.1
 # A trial is backwards from this share of the usual contrast on.
 _OTHER_WAY = -0.5
 _KINDS = {
@@ -83,8 +82,8 @@ class WholeBody:
     """
 
     def __init__(self, in_time, groups, on_clock, groups_on_clock, coverage):
-        self._mean = on_clock.mean(axis=0)
-        self._swing = self._mean - self._mean.mean(axis=0)
+        mean = on_clock.mean(axis=0)
+        self._swing = mean - mean.mean(axis=0)
         self._norms = np.square(self._swing).sum(axis=0)
         total = on_clock.var(axis=(0, 1))
         # Columns count by what all trials do alike.
@@ -93,43 +92,37 @@ class WholeBody:
         self._moves = bool((self._norms > 0).any())
         if not self._moves:
             return
-        measured = [self._in_time(x) for x in in_time]
+        times, _ = zip(*(self._in_time(x) for x in in_time), strict=True)
         self._limits = {
             name: LogPredictionInterval(
-                np.array([each[name] for each in measured]), groups, coverage, _PRIOR_VARIANCE
+                np.array([each[name] for each in times]), groups, coverage, _PRIOR_VARIANCE
             )
             for name in ("start", "stop", "pause")
         }
         amplitudes = np.array([self._amplitude(x) for x in on_clock])
         self._limits["amplitude"] = LogPredictionInterval(amplitudes, groups_on_clock, coverage)
         # Trials of one person are alike, so a limit is as sure as so few people make it.
-        tail = (1 + coverage) / 2
-        self._few = {
-            name: _limit_of(tail, len(np.unique(of_limit))) / _limit_of(tail, len(of_limit))
-            for name, of_limit in {
-                **dict.fromkeys(("start", "stop", "pause"), groups),
-                "amplitude": groups_on_clock,
-            }.items()
-        }
+        of_few = dict.fromkeys(("start", "stop", "pause"), _widening(groups, coverage))
+        self._of_few = {**of_few, "amplitude": _widening(groups_on_clock, coverage)}
         differences = on_clock - on_clock[:, ::-1]
         self._difference = differences.mean(axis=0)
         of_others = mean_of_others(differences, groups_on_clock)
         held_out = [self._direction(x, m) for x, m in zip(differences, of_others, strict=True)]
         changes = np.square(self._difference - self._difference.mean(axis=0)).mean(axis=0)
-        is_large = self._weights @ (changes > _LARGE * total) > 0.5
+        is_large = self._weights @ (changes > LARGE * total) > 0.5
         self._middle = np.mean(held_out)
-        self._has_direction = bool(is_large and self._middle > _CLEAR * np.std(held_out))
+        self._has_direction = bool(is_large and self._middle > CLEAR * np.std(held_out))
 
     def find(self, in_time, on_clock):
         """The faults of a trial (P, n_columns), in linear time and on the clock."""
         if not self._moves:
             return []
-        faults, measures = [], self._in_time(in_time)
+        faults, (measures, pause) = [], self._in_time(in_time)
         measures["amplitude"] = self._amplitude(on_clock)
         places = {
             "start": (0.0, measures["start"] - _ADDED),
             "stop": (1 + _ADDED - measures["stop"], 1.0),
-            "pause": self._pause(in_time),
+            "pause": pause,
             "amplitude": (0.0, 1.0),
         }
         for name, limit in self._limits.items():
@@ -144,7 +137,7 @@ class WholeBody:
                     continue
                 size, unit = ratio, "ratio"
             deviation = excess * limit.end
-            rarity = abs(excess) / self._few[name]
+            rarity = abs(excess) / self._of_few[name]
             fault = WholeFault(kind, *places[name], size, unit, abs(excess), rarity, deviation)
             faults.append(fault)
         if self._has_direction:
@@ -156,35 +149,33 @@ class WholeBody:
         return faults
 
     def _in_time(self, trial):
-        """When a trial starts, how long before its end it stops, and its longest pause."""
-        done = np.cumsum(self._squared_speeds(trial), axis=0)
-        # Columns that never move have started, and stopped, at once.
-        done /= np.where(done[-1] > 0, done[-1], 1)
+        """When a trial starts, how long before its end it stops, and its longest pause.
+
+        With the first and last time of the pause.
+        """
+        squares = np.square(smooth(trial[np.newaxis], _SMOOTHING * (len(trial) - 1), order=1)[0])
+        # Each column relative to all that it does; one that never moves starts and stops at once.
+        sums = squares.sum(axis=0)
+        squares = squares / np.where(sums > 0, sums, 1)
+        done = np.cumsum(squares, axis=0)
         starts, stops = (done < _AT_ENDS).mean(axis=0), (done < 1 - _AT_ENDS).mean(axis=0)
         # One limb that is late does not make the body late.
         start, stop = self._quantile(starts, _FEW_COLUMNS), self._quantile(stops, 1 - _FEW_COLUMNS)
-        first, last = self._pause(trial)
-        return {"start": start + _ADDED, "stop": 1 - stop + _ADDED, "pause": last - first + _ADDED}
-
-    def _squared_speeds(self, trial):
-        return np.square(smooth(trial[np.newaxis], _SMOOTHING * (len(trial) - 1), order=1)[0])
+        speeds = squares @ self._weights
+        done = np.cumsum(speeds) / max(speeds.sum(), np.finfo(float).tiny)
+        is_inside = (done > _AT_ENDS) & (done < 1 - _AT_ENDS)
+        runs = runs_of((speeds < _SLOW * speeds.mean()) & is_inside)
+        pause = (0.0, 0.0)
+        if len(runs):
+            pause = tuple(runs[first_largest(np.diff(runs)[:, 0])] / len(trial))
+        measures = {"start": start, "stop": 1 - stop, "pause": pause[1] - pause[0]}
+        return {name: share + _ADDED for name, share in measures.items()}, pause
 
     def _quantile(self, values, share):
         """The value that a share of the columns, by their weights, does not exceed."""
         order = np.argsort(values, kind="stable")
         reached = np.cumsum(self._weights[order]) >= share - ROUNDING
         return values[order[np.flatnonzero(reached)[0]]]
-
-    def _pause(self, trial):
-        """Where the longest pause is, as shares of the time."""
-        squares = self._squared_speeds(trial)
-        means = squares.mean(axis=0)
-        # The mean over the columns, each relative to its own mean.
-        speeds = (squares / np.where(means > 0, means, 1)) @ self._weights
-        done = np.cumsum(speeds) / max(speeds.sum(), np.finfo(float).tiny)
-        is_inside = (done > _AT_ENDS) & (done < 1 - _AT_ENDS)
-        runs = runs_of((speeds < _SLOW * speeds.mean()) & is_inside)
-        return runs[first_largest(np.diff(runs)[:, 0])] / len(trial) if len(runs) else (0.0, 0.0)
 
     def _amplitude(self, trial):
         """The factor of the mean movement in a trial, above 0."""
@@ -205,6 +196,8 @@ class WholeBody:
         return float(self._weights @ np.clip(ratios, -_MOST_OF_COLUMN, _MOST_OF_COLUMN))
 
 
-def _limit_of(tail, n):
-    """The limit of a new value in standard deviations, by n others."""
-    return student.ppf(tail, n - 1 + PRIOR_COUNT) * np.sqrt(1 + 1 / n)
+def _widening(groups, coverage):
+    """By how much a limit is wider if each of the groups (n,) counts as a single trial."""
+    counts, tail = np.array([len(np.unique(groups)), len(groups)]), (1 + coverage) / 2
+    few, many = student.ppf(tail, counts - 1 + PRIOR_COUNT) * np.sqrt(1 + 1 / counts)
+    return few / many

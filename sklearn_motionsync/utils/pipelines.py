@@ -33,7 +33,7 @@ def matches_of_a_fit(known=None):
 
     The ``fit`` of scikit-learn's pipelines warps the training trials and hands on no match. What
     goes on with the same trials takes it from here and does not match them again. Those that are
-    known already are given.
+    known already are given, and under ``"reference"`` those of a reference.
     """
     token = _matches.set({} if known is None else known)
     try:

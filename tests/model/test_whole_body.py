@@ -148,6 +148,20 @@ def test_a_detector_tells_what_recordings_alone_show(bends):
     assert row[["limb", "unit"]].tolist() == ["whole body", "ratio"]
 
 
+def test_a_detector_and_its_departures_match_each_trial_once(bends, monkeypatch):
+    pipe, others, own, groups = bends
+    detector = ActionDetector(pipe).fit(others, groups=groups)
+    counts, match = [], DenseSynchronizer.match
+
+    def counted(self, trials, **params):
+        counts.append(len(trials))
+        return match(self, trials, **params)
+
+    monkeypatch.setattr(DenseSynchronizer, "match", counted)
+    find_departures(detector, own[3:5], reference=own[:3])
+    assert sorted(counts) == [2, 3]
+
+
 def test_pauses_of_real_people_are_told(hdm05):
     """Hops of two people, each left out: a pause in the middle, and the hops as they are."""
     is_hop = hdm05.target == "hopBothLegs1hops"
