@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -325,20 +326,22 @@ class _Numbers:
     """All frames of trials below each other, and what is asked of them more than once."""
 
     def __init__(self, trials):
-        lengths = np.array([len(x) for x in trials])
-        self.trials, self.lengths = trials, lengths
-        self.starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+        self.trials = trials
+        self.lengths = np.array([len(x) for x in trials])
+        self.starts = np.concatenate([[0], np.cumsum(self.lengths)[:-1]])
         self.values = np.concatenate(list(trials)) if len(trials) > 1 else np.asarray(trials[0])
-        self.is_gappy = bool(np.isnan(self.values.sum()))
-        smallest, largest = (np.fmin, np.fmax) if self.is_gappy else (np.minimum, np.maximum)
-        self.low, self.high = smallest.reduce(self.values), largest.reduce(self.values)
-        # That to the next frame; none leads from one trial to the next.
-        steps = np.zeros_like(self.values)
-        np.subtract(self.values[1:], self.values[:-1], out=steps[:-1])
-        steps[self.starts[1:] - 1] = 0
-        np.abs(steps, out=steps)
-        self.steps = np.nan_to_num(steps, copy=False) if self.is_gappy else steps
+        self.low, self.high = self.values.min(axis=0), self.values.max(axis=0)
+        self.is_gappy = bool(np.isnan(self.low).any())
+        if self.is_gappy:
+            self.low, self.high = np.fmin.reduce(self.values), np.fmax.reduce(self.values)
 
+    def steps(self, columns=slice(None)):
+        """Sizes of the steps to the next frame; none leads from one trial to the next."""
+        steps = np.abs(np.diff(self.values[:, columns], axis=0))
+        steps[self.starts[1:] - 1] = 0
+        return np.nan_to_num(steps, copy=False) if self.is_gappy else steps
+
+    @cached_property
     def sample(self):
         """Frames of each trial, evenly spread: (n_sequences, 16, n_features), 0 in gaps."""
         shares = np.linspace(0, 1, _SAMPLED)
@@ -359,12 +362,15 @@ def _look(trials, names, cheap=False):
     findings += [*_fill_values(numbers), *_clocks(numbers)]
     if not cheap:
         findings += _throughout("constant", numbers, numbers.low == numbers.high)
-    findings += [*_ends(numbers, cheap), *_factors(numbers)]
+    padded = list(_padding(numbers))
+    findings += [*padded, *_factors(numbers)]
     ends = [] if names is None else [str(name)[-1:].lower() for name in names[:3]]
     # A fit looks where the first columns are the axes of a joint.
     if not cheap or ends == ["x", "y", "z"]:
         findings += _exchanged(numbers)
-    return findings if cheap else findings + [*_other_rates(numbers)]
+    if not cheap:
+        findings += [*_held(numbers, {each.trial for each in padded}), *_other_rates(numbers)]
+    return findings
 
 
 def _throughout(kind, numbers, is_one):
@@ -383,15 +389,14 @@ def _of_feature(kind, numbers, k, rows, value, facts=None):
 
 def _wrapping(numbers):
     """Features that jump from one limit of a turn to the other."""
-    largest = numbers.steps.max(axis=0)
     for low, high, unit in _TURNS:
         period = high - low
         slack = _NEAR * period
         inside = (numbers.low >= low - 1e-3 * period) & (numbers.high <= high + 1e-3 * period)
-        for k in np.flatnonzero(inside & (largest > _JUMP * period)):
-            x, steps = numbers.values[:, k], numbers.steps[:, k]
+        for k in np.flatnonzero(inside & (numbers.high - numbers.low > _JUMP * period)):
+            x, steps = numbers.values[:, k], numbers.steps(k)
             rows = np.flatnonzero(steps > _JUMP * period)
-            if len(rows) > _RARE * len(x):
+            if not 0 < len(rows) <= _RARE * len(x):
                 continue
             pairs = np.stack([x[rows], x[rows + 1]])
             ends = (pairs.min(axis=0) < low + slack) & (pairs.max(axis=0) > high - slack)
@@ -408,13 +413,13 @@ def _quaternions(numbers):
     fits = (numbers.low > -1.01) & (numbers.high < 1.01)
     if width < 4 or not fits.any():
         return
-    # A few frames tell where none is.
-    squares = np.square(numbers.sample().reshape(-1, width))
-    of_four, of_three = (sum(squares[:, i : width - n + i + 1] for i in range(n)) for n in (4, 3))
-    unit = (np.abs(of_four - 1) < 0.01).all(axis=0)
-    # Three columns of length 1 are a direction.
-    direction = (np.abs(of_three - 1) < 1e-3).all(axis=0)
-    unit &= ~(direction[:-1] | direction[1:])
+    # The first frames tell where none is, and a few of each trial the others.
+    unit = _is_unit(numbers.values[numbers.starts], 4, 0.01)
+    if unit.any():
+        sample = numbers.sample.reshape(-1, width)
+        # Three columns of length 1 are a direction.
+        direction = _is_unit(sample, 3, 1e-3)
+        unit = _is_unit(sample, 4, 0.01) & ~(direction[:-1] | direction[1:])
     after = 0
     for k in np.flatnonzero(unit):
         q = numbers.values[:, k : k + 4]
@@ -428,6 +433,13 @@ def _quaternions(numbers):
             flips = np.concatenate([np.flatnonzero(signs < 0) + 1, numbers.starts[firsts < 0]])
             if len(flips):
                 yield _of_feature("quaternion", numbers, k, np.sort(flips), np.nan)
+
+
+def _is_unit(rows, n, tolerance):
+    """Whether n columns, from each one on, are of length 1 in all rows."""
+    squares = np.square(rows)
+    lengths = sum(squares[:, i : squares.shape[1] - n + i + 1] for i in range(n))
+    return (np.abs(lengths - 1) < tolerance).all(axis=0)
 
 
 def _quality(numbers, names):
@@ -450,16 +462,17 @@ def _quality(numbers, names):
 
 def _fill_values(numbers):
     """Features with stretches of a number that stands for what was not seen."""
-    values, steps = numbers.values, numbers.steps[:-1]
+    values, moves = numbers.values, numbers.low < numbers.high
     borders = numbers.starts[1:] - 1
-    for fill in _FILLS:
-        reaches = (numbers.low <= fill) & (numbers.high >= fill) & (numbers.low < numbers.high)
-        if not reaches.any():
-            continue
+    fills = np.array(_FILLS)[:, np.newaxis]
+    reaches = (numbers.low <= fills) & (numbers.high >= fills) & moves
+    for fill in np.array(_FILLS)[reaches.any(axis=1)]:
         is_fill = values == fill
-        counts, hidden = is_fill.sum(axis=0), np.zeros(len(reaches), dtype=bool)
-        for k in np.flatnonzero(reaches & (counts >= _FEWEST) & (counts <= len(values) / 2)):
-            filled, of_k = is_fill[:, k], steps[:, k]
+        if np.count_nonzero(is_fill) < _FEWEST:
+            continue
+        counts, hidden = is_fill.sum(axis=0), np.zeros(len(moves), dtype=bool)
+        for k in np.flatnonzero(moves & (counts >= _FEWEST) & (counts <= len(values) / 2)):
+            filled, of_k = is_fill[:, k], numbers.steps(k)
             others = values[~filled, k]
             others = others[~np.isnan(others)]
             # Steps between the other values, and those to and from the fill value.
@@ -468,16 +481,19 @@ def _fill_values(numbers):
             between = ~filled[:-1] & ~filled[1:]
             if not len(others) or not between.any() or not joins.any():
                 continue
-            usual, moved = np.quantile(of_k[between], 0.95), np.mean(of_k[between] > 0)
-            span = max(np.ptp(others), abs(np.median(others) - fill))
-            limit = max(_FILL_STEP * span, _FILL_STEPS * usual)
-            if moved > 0.5 and of_k[joins].min() > limit:
+            smallest, span = of_k[joins].min(), np.ptp(others)
+            if smallest <= _FILL_STEP * span:
+                continue
+            span = max(span, abs(np.median(others) - fill))
+            limit = max(_FILL_STEP * span, _FILL_STEPS * np.quantile(of_k[between], 0.95))
+            if smallest > limit and np.mean(of_k[between] > 0) > 0.5:
                 # So are the other coordinates of a joint, which may be near to the fill value.
-                same = is_fill[filled].all(axis=0) & (numbers.low < numbers.high)
+                same = is_fill[filled].all(axis=0) & moves
                 # Where whole frames have it, the trial is padded.
                 hidden |= same & ~is_fill[filled].all()
         for k in np.flatnonzero(hidden):
-            yield _of_feature("fill value", numbers, k, np.flatnonzero(is_fill[:, k]), fill)
+            rows = np.flatnonzero(is_fill[:, k])
+            yield _of_feature("fill value", numbers, k, rows, float(fill))
 
 
 def _clocks(numbers):
@@ -496,47 +512,43 @@ def _clocks(numbers):
     return _throughout("clock", numbers, clocks)
 
 
-def _ends(numbers, cheap):
-    """Trials that end in zeros, NaN or a pose that is held, and those that freeze within."""
-    still = ~numbers.steps.any(axis=1)
-    still_rows = np.add.reduceat(still, numbers.starts)
-    missing = np.isnan(numbers.values).all(axis=1) if numbers.is_gappy else None
-    if missing is not None:
-        still &= ~missing
-    for i in np.flatnonzero((still_rows > _FEWEST) | (missing is not None)):
-        x, start = numbers.trials[i], numbers.starts[i]
-        n, frames = len(x), slice(start, start + len(x))
-        if missing is not None and missing[frames][-1]:
-            first = n - _run(missing[frames][::-1])
-            yield Finding("missing at the end", int(i), None, first, n - 1, np.nan)
+def _padding(numbers):
+    """Trials that end in zeros or in NaN."""
+    last = numbers.values[numbers.starts + numbers.lengths - 1]
+    for i in np.flatnonzero(((last == 0) | np.isnan(last)).all(axis=1)):
+        x, n = numbers.trials[i], numbers.lengths[i]
+        n_missing = _run(np.isnan(x).all(axis=1)[::-1])
+        if n_missing:
+            yield Finding(
+                "missing at the end", int(i), None, int(n - n_missing), int(n - 1), np.nan
+            )
             continue
         zero = (x == 0).all(axis=1)
         n_zero = _run(zero[::-1])
-        # The last step is that to the next trial.
-        quiet = still[frames][:-1]
-        steps = numbers.steps[frames][:-1]
         if _FEWEST <= n_zero < n and not zero[0]:
-            usual = steps[: n - n_zero - 1].sum(axis=1)
-            if steps[n - n_zero - 1].sum() > _FILL_STEPS * (np.median(usual) if len(usual) else 0):
-                yield Finding("zeros at the end", int(i), None, n - n_zero, n - 1, np.nan)
-                continue
-        if cheap:
+            steps = np.nan_to_num(np.abs(np.diff(x, axis=0)).sum(axis=1))
+            usual = steps[: n - n_zero - 1]
+            if steps[n - n_zero - 1] > _FILL_STEPS * (np.median(usual) if len(usual) else 0):
+                yield Finding("zeros at the end", int(i), None, int(n - n_zero), int(n - 1), np.nan)
+
+
+def _held(numbers, padded):
+    """Runs of frames, of trials without padding, in which all features repeat exactly."""
+    still = ~numbers.steps().any(axis=1)
+    if numbers.is_gappy:
+        still &= ~np.isnan(numbers.values[:-1]).all(axis=1)
+    for i, start in enumerate(numbers.starts):
+        n = int(numbers.lengths[i])
+        quiet = still[start : start + n - 1]
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], quiet.astype(int), [0]])))
+        long = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= _HELD]
+        n_others = quiet.sum() - sum(b - a for a, b in long)
+        # One that begins still may also end still.
+        if i in padded or not long or long[0][0] == 0 or n_others > _REPEATS * len(quiet):
             continue
-        yield from _held(int(i), quiet, n)
-
-
-def _held(i, quiet, n):
-    """Runs of frames of a trial in which all features repeat themselves exactly."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], quiet.astype(int), [0]])))
-    runs = edges.reshape(-1, 2)
-    long = [(int(a), int(b)) for a, b in runs if b - a >= _HELD]
-    n_others = quiet.sum() - sum(b - a for a, b in long)
-    # One that begins still may also end still.
-    if not long or long[0][0] == 0 or n_others > _REPEATS * len(quiet):
-        return
-    for a, b in long:
-        kind = "held at the end" if b == n - 1 else "frozen"
-        yield Finding(kind, i, None, a + 1, b, np.nan)
+        for a, b in long:
+            kind = "held at the end" if b == n - 1 else "frozen"
+            yield Finding(kind, i, None, a + 1, b, np.nan)
 
 
 def _run(flags):
@@ -548,7 +560,7 @@ def _factors(numbers):
     """Trials that are so many times as large as the others as units differ."""
     if len(numbers.trials) < 3:
         return
-    squares = np.square(numbers.sample()).mean(axis=1)
+    squares = np.square(numbers.sample).mean(axis=1)
     usual = np.median(squares, axis=0)
     counts = usual > 1e-12 * usual.max(initial=0)
     if not counts.any():
@@ -575,7 +587,7 @@ def _exchanged(numbers):
     width, n = numbers.values.shape[1], len(numbers.trials)
     if width % 3 or width < 9 or n < 4 or numbers.is_gappy:
         return
-    means = numbers.sample().mean(axis=1).reshape(n, -1, 3)
+    means = numbers.sample.mean(axis=1).reshape(n, -1, 3)
     means -= means.mean(axis=1, keepdims=True)
     usual = np.median(means, axis=0)
     away = np.linalg.norm(means - usual, axis=(1, 2))
