@@ -41,3 +41,13 @@ class Page(HTMLParser):
     def data(self):
         """What a report or a player holds for its script."""
         return json.loads(re.search(r'id="data">(.*?)</script>', self.page, re.DOTALL)[1])
+
+    def check_that_nothing_is_loaded(self):
+        """No address, no element that fetches, and a policy that forbids it."""
+        assert not re.search(r"://|@import|url\(", self.page)
+        for tag, attributes in self.tags:
+            assert tag not in ("link", "iframe", "object", "embed")
+            assert attributes.get("src", "data:").startswith("data:")
+            assert attributes.get("href", "#").startswith("#")
+        policy = [a["content"] for _, a in self.tags if a.get("http-equiv")]
+        assert "default-src 'none'" in policy[0]
