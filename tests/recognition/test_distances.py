@@ -131,7 +131,12 @@ def test_blocks_hold_every_pair_once_and_nothing_else(n_bases, n_moving):
 
 
 def test_single_precision_is_right_to_six_digits():
-    on_clock = normalise_time(walks(20, 5), 50)
+    """Time is normalised in double precision, whatever the trials have."""
+    X = [x.astype(np.float32) for x in walks(20, 5)]
+    on_clock = normalise_time([x.astype(np.float64) for x in X], 50)
+    for one, double in zip(normalise_time(X, 50), on_clock, strict=True):
+        assert one.dtype == np.float64
+        np.testing.assert_array_equal(one, double)
     for cost, normalize in itertools.product(COSTS, (True, False)):
         both = []
         for dtype in (np.float64, np.float32):
@@ -143,23 +148,20 @@ def test_single_precision_is_right_to_six_digits():
         np.testing.assert_allclose(both[1], both[0], rtol=1e-5, atol=1e-6 * both[0].max())
 
 
-def test_jobs_give_the_same_distances():
-    X = walks(BLOCK * 8)
-    D = synchronization_distances(X, n_frames=12)
-    with parallel_config(backend="threading"):
-        np.testing.assert_array_equal(synchronization_distances(X, n_frames=12, n_jobs=2), D)
-
-
-def test_jobs_share_the_pairs_and_none_is_compared_twice(monkeypatch):
-    blocks, jobs = [], []
+def test_jobs_share_the_pairs_and_give_the_same_distances(monkeypatch):
+    """None is compared twice."""
+    X, blocks, jobs = walks(BLOCK * 8), [], []
+    expected = synchronization_distances(X, n_frames=12)
 
     def recorded(function, portions, *, common, n_jobs, step):
         jobs.append(n_jobs)
         blocks.extend(str(block) for portion in portions for block in portion[0])
-        return run(function, portions, common=common, step=step)
+        return run(function, portions, common=common, n_jobs=n_jobs, step=step)
 
     monkeypatch.setattr(distances, "run", recorded)
-    synchronization_distances(walks(BLOCK * 8), n_frames=4, n_jobs=2)
+    with parallel_config(backend="threading"):
+        found = synchronization_distances(X, n_frames=12, n_jobs=2)
+    np.testing.assert_array_equal(found, expected)
     assert jobs == [2]
     assert len(blocks) == len(set(blocks)) == 64
 
@@ -249,10 +251,3 @@ def test_nearest_neighbours_among_new_people(utkinect):
         nearest.fit(D[np.ix_(~out, ~out)], utkinect.target[~out])
         found[out] = nearest.predict(D[np.ix_(out, ~out)])
     assert np.mean(found == utkinect.target) > 0.8
-
-
-def test_single_precision_is_normalised_in_double():
-    x = np.cumsum(np.random.default_rng(0).standard_normal((30, 2)), axis=0).astype(np.float32)
-    double = normalise_time([x.astype(np.float64)], 47)
-    np.testing.assert_array_equal(normalise_time([x], 47), double)
-    assert normalise_time([x], 47).dtype == np.float64

@@ -1,9 +1,8 @@
-"""The views of trials and their weights: against convolutions, loops and simulated people."""
+"""The views of trials and their weights: against convolutions and loops."""
 
 import numpy as np
 import pytest
 from sklearn.preprocessing import scale
-from sklearn_motionsync import ActionClassifier
 from sklearn_motionsync.recognition.kernel import (
     align_weights,
     change_extremes,
@@ -92,30 +91,3 @@ def test_weights_are_powers_of_correlations_over_pairs_of_different_groups(landm
     assert found.sum() == pytest.approx(1)
     constant = np.ones((2, 40, len(landmarks)))
     np.testing.assert_array_equal(align_weights(constant, codes, groups, landmarks), [0.5, 0.5])
-
-
-def exercises(n=40, seed=0):
-    """People who stand differently swing an arm, in time or with a rest: data, labels, people."""
-    rng = np.random.default_rng(seed)
-    X, y, people = [], np.arange(n) % 2, np.arange(n) // 4
-    stance = 3 * np.random.default_rng(9).standard_normal((n // 4, 4))
-    for i in range(n):
-        t = np.linspace(0, 1, rng.integers(40, 60)) ** rng.uniform(0.8, 1.25)
-        angle = np.sin(2 * np.pi * t)
-        swing = np.sign(angle) * np.abs(angle) ** (0.6 if y[i] else 1)
-        x = stance[people[i]] + 0.02 * rng.standard_normal((len(t), 4))
-        x[:, 0] += rng.uniform(0.8, 1.2) * swing
-        X.append(x)
-    return X, y, people
-
-
-def test_groups_take_the_weight_off_what_tells_people_apart():
-    X, y, people = exercises()
-    train, test = people < 8, people >= 8
-    known, new = ([X[i] for i in np.flatnonzero(some)] for some in (train, test))
-    classifier = ActionClassifier(n_frames=25).fit(known, y[train], groups=people[train])
-    assert classifier.weights_.shape == (4,)
-    assert classifier.weights_.sum() == pytest.approx(1)
-    poses, summaries = classifier.weights_[1:3]
-    assert classifier.weights_[[0, 3]].min() > 10 * max(poses, summaries)
-    assert classifier.score(new, y[test]) == 1
