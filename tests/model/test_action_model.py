@@ -22,9 +22,14 @@ def model(trials):
 
 
 def test_density_equals_that_of_normal_distributions(model, trials):
-    expected = norm(trials.mean(axis=0), trials.std(axis=0)).logpdf(trials)
-    np.testing.assert_allclose(model.score_samples(trials), expected.sum(axis=(1, 2)))
-    np.testing.assert_allclose(model.score(trials), expected.sum(axis=(1, 2)).mean())
+    densities = norm(trials.mean(axis=0), trials.std(axis=0)).logpdf(trials)
+    expected = densities.sum(axis=(1, 2))
+    np.testing.assert_allclose(model.score_samples(trials), expected)
+    np.testing.assert_allclose(model.score(trials), expected.mean())
+    weighted = model.score(trials[:5], sample_weight=[0, 1, 2, 3, 4])
+    np.testing.assert_allclose(weighted, np.arange(5) @ expected[:5] / 10)
+    with pytest.raises(ValueError, match="inconsistent numbers of samples"):
+        model.score(trials[:5], sample_weight=[1, 2])
 
 
 def test_accepts_poses_inside_in_every_feature(model):
@@ -40,17 +45,6 @@ def test_poses_are_compared_in_the_precision_of_the_model(trials):
     lower, upper = (bound[4].astype("f8") for bound in model.envelope())
     assert model.accepts([lower - 1e-12, upper + 1e-12], 4).all()
     assert not model.accepts([lower - 1e-3, upper + 1e-3], 4).any()
-
-
-# -- scores and samples ------------------------------------------------------------------
-
-
-def test_score_weights_trials(model, trials):
-    weights = np.arange(5.0)
-    expected = (weights * model.score_samples(trials[:5])).sum() / weights.sum()
-    np.testing.assert_allclose(model.score(trials[:5], sample_weight=weights), expected)
-    with pytest.raises(ValueError, match="inconsistent numbers of samples"):
-        model.score(trials[:5], sample_weight=[1, 2])
 
 
 @pytest.mark.parametrize("n_std", [0.3, 3.0])
@@ -111,23 +105,20 @@ def test_model_of_identical_trials(value):
     assert model.predict([np.full((5, 2), value + 1 + value)]).tolist() == [-1]
 
 
-@pytest.mark.parametrize("frame", [-1, 15, 2.5, "3"])
-def test_accepts_and_sample_refuse_frames_outside(model, frame):
-    for ask in (lambda: model.accepts([[0.0, 0, 0]], frame), lambda: model.sample(2, frame=frame)):
-        with pytest.raises(ValueError, match="from 0 to 14"):
-            ask()
-
-
-@pytest.mark.parametrize("poses", [[0.0, 0, 0], [[0.0, 0]], [[np.inf, 0, 0]]])
-def test_accepts_refuses_invalid_poses(model, poses):
-    with pytest.raises(ValueError, match="poses"):
-        model.accepts(poses, 0)
-
-
-@pytest.mark.parametrize("n", [0, -1, 2.5])
-def test_sample_refuses_invalid_numbers(model, n):
-    with pytest.raises(ValueError, match="whole number of samples"):
-        model.sample(n)
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        *((lambda m, f=f: m.accepts([[0.0, 0, 0]], f), "from 0 to 14") for f in (-1, 15, 2.5)),
+        *((lambda m, f=f: m.sample(2, frame=f), "from 0 to 14") for f in (-1, 15, "3")),
+        (lambda m: m.accepts([0.0, 0, 0], 0), r"poses must have shape \(n_poses, 3\)"),
+        (lambda m: m.accepts([[0.0, 0]], 0), r"poses must have shape \(n_poses, 3\)"),
+        (lambda m: m.accepts([[np.inf, 0, 0]], 0), "poses, row 0.* infinity"),
+        *((lambda m, n=n: m.sample(n), "whole number of samples") for n in (0, -1, 2.5)),
+    ],
+)
+def test_what_is_no_frame_pose_or_number_is_refused(model, ask, message):
+    with pytest.raises(ValueError, match=message):
+        ask(model)
 
 
 # -- groups -----------------------------------------------------------------------------

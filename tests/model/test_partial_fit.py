@@ -16,37 +16,29 @@ from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import ActionModel, to_frame
 from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.model.similarity import TrialStream
-from test_similarity import (
-    curves,
-    slow_dissimilarity,
-    slow_threshold,
-    slow_weights,
-)
+from test_similarity import curves, hide, slow_dissimilarity, slow_threshold, slow_weights
 
 few = settings(max_examples=8, deadline=None, derandomize=True, database=None)
 
 
-def in_portions(X, groups=None, cuts=(), model=None):
-    model = ActionModel() if model is None else model
-    groups = None if groups is None else list(groups)
-    edges = [0, *sorted(cuts), len(X)]
-    for start, stop in pairwise(edges):
+def in_portions(X, groups=None, cuts=()):
+    model = ActionModel()
+    for start, stop in pairwise([0, *sorted(cuts), len(X)]):
         if start < stop:
             some = None if groups is None else groups[start:stop]
             assert model.partial_fit(X[start:stop], groups=some) is model
     return model
 
 
-def state_of(model):
-    """The attributes that do not depend on portions."""
-    names = ("mean_", "variance_", "predictive_variance_", "deviations_", "groups_")
-    return {name: getattr(model, name) for name in (*names, "n_samples_seen_", "n_frames_")}
+# What does not depend on portions.
+NAMES = "mean_", "variance_", "predictive_variance_", "missing_", "deviations_", "groups_"
 
 
 def assert_same_state(model, expected):
-    for name, value in state_of(expected).items():
-        np.testing.assert_array_equal(getattr(model, name), value, err_msg=name)
-        assert np.asarray(getattr(model, name)).dtype == np.asarray(value).dtype, name
+    for name in (*NAMES, "n_samples_seen_", "n_frames_"):
+        found, value = (np.asarray(getattr(each, name)) for each in (model, expected))
+        np.testing.assert_array_equal(found, value, err_msg=name)
+        assert found.dtype == value.dtype, name
 
 
 # -- as one fit -------------------------------------------------------------------------
@@ -66,21 +58,23 @@ def test_partial_fits_equal_one_fit_to_the_last_bit(data):
     assert_same_state(model, expected)
     assert model.threshold_ == expected.threshold_
     new = curves(5, seed=7, spread=0.4, n_frames=12).astype(X.dtype)
-    for ask in ("predict", "decision_function", "score_samples"):
-        np.testing.assert_array_equal(getattr(model, ask)(new), getattr(expected, ask)(new))
-    for frame in (None, 4):
-        drawn = [m.sample(3, frame=frame, random_state=0) for m in (model, expected)]
-        np.testing.assert_array_equal(*drawn)
-    np.testing.assert_array_equal(model.envelope(True), expected.envelope(True))
+    for ask in (
+        lambda m: m.decision_function(new),
+        lambda m: m.score_samples(new),
+        lambda m: m.sample(3, random_state=0),
+        lambda m: m.sample(3, frame=4, random_state=0),
+        lambda m: m.envelope(simultaneous=True),
+    ):
+        np.testing.assert_array_equal(ask(model), ask(expected))
 
 
-@pytest.mark.parametrize("size", [1, 50])
-def test_kept_trials_do_not_depend_on_portions(size):
-    X, groups = curves(80, n_frames=10), np.arange(80) ** 2 // 150
-    for some in (None, groups):
-        model = in_portions(X, some, range(0, 80, size))
-        assert_same_state(model, ActionModel().fit(X, groups=some))
-        assert len(model.groups_) == 64
+@pytest.mark.parametrize("groups", [None, np.arange(80) ** 2 // 150])
+@pytest.mark.parametrize(("size", "share"), [(1, 0), (50, 0), (50, 0.4)])
+def test_kept_trials_do_not_depend_on_portions(groups, size, share):
+    X = hide(curves(80, n_frames=10), share, length=3)
+    model = in_portions(X, groups, range(0, 80, size))
+    assert_same_state(model, ActionModel().fit(X, groups=groups))
+    assert len(model.groups_) == 64
 
 
 def test_mean_and_variance_are_exact_to_rounding():
@@ -122,12 +116,6 @@ def test_a_label_is_the_same_group_in_all_calls():
 # -- trials kept -------------------------------------------------------------------
 
 
-def kept_of(groups):
-    """Indices of the trials of these groups that a stream keeps."""
-    X = np.zeros((len(groups), 2, 1))
-    return np.flatnonzero(TrialStream.starting_at(X[0]).extend(X, groups)[2])
-
-
 def slow_choice(groups, most=64):
     """First of every group, then the others; each by its multiple of the golden ratio."""
     golden = math.isqrt(5 << 128) - (1 << 64) >> 1
@@ -142,7 +130,8 @@ def slow_choice(groups, most=64):
 
 @pytest.mark.parametrize("groups", [[0] * 500, list(range(300)), [i // 4 for i in range(700)]])
 def test_kept_trials_are_evenly_spread(groups):
-    kept = kept_of(groups)
+    X = np.zeros((len(groups), 2, 1))
+    kept = np.flatnonzero(TrialStream.starting_at(X[0]).extend(X, groups)[2])
     assert kept.tolist() == slow_choice(groups)
     # At three distances, none of them above twice the mean.
     gaps = np.diff(np.array(groups)[kept] if len(set(groups)) > 64 else kept)
@@ -153,26 +142,31 @@ def test_kept_trials_are_evenly_spread(groups):
 # -- the threshold ----------------------------------------------------------------------
 
 
-def test_dropped_trials_keep_their_dissimilarity_in_the_threshold():
-    """In two portions, each with more than are kept, by loops."""
-    X, groups = curves(72, n_frames=8), np.arange(72) % 9
-    edges, kept, values = [0, 68, 72], [], {}
+@pytest.mark.parametrize(
+    ("groups", "edges"),
+    [
+        # Two portions, the first with more than are kept.
+        (np.arange(72) % 9, [0, 68, 72]),
+        # What was dropped before the second group came has no dissimilarity.
+        (np.repeat([0, 1], [90, 6]), [0, 70, 90, 96]),
+    ],
+)
+def test_dropped_trials_keep_their_dissimilarity_in_the_threshold(groups, edges):
+    """By loops."""
+    X, kept, values = curves(len(groups), n_frames=8), [], {}
     for start, stop in pairwise(edges):
         compared = [*kept, *range(start, stop)]
         kept = slow_choice(groups[:stop])
-        weights = slow_weights(X[kept], groups[kept])
-        for i in compared:
-            others = [X[j] for j in kept if groups[j] != groups[i]]
-            values[i] = slow_dissimilarity(X[i], others, weights)
+        if len(set(groups[:stop])) > 1:
+            weights = slow_weights(X[kept], groups[kept])
+            for i in compared:
+                others = [X[j] for j in kept if groups[j] != groups[i]]
+                values[i] = slow_dissimilarity(X[i], others, weights)
     model = in_portions(X, groups, edges)
     np.testing.assert_array_equal(model.groups_, groups[kept])
     np.testing.assert_allclose(model.threshold_, slow_threshold(list(values.values()), 0.95))
-    last = [values[i] for i in range(68, 72)]
+    last = [values[i] for i in range(*edges[-2:])]
     np.testing.assert_allclose(model.dissimilarities_, last, rtol=1e-9)
-    # In one fit earlier trials are compared with others.
-    expected = ActionModel().fit(X, groups=groups).threshold_
-    assert model.threshold_ != expected
-    np.testing.assert_allclose(model.threshold_, expected, rtol=0.1)
 
 
 @pytest.mark.parametrize("groups", [None, ["ann"] * 3])
@@ -196,19 +190,6 @@ def test_a_single_group_gives_moments_only(groups):
     assert_same_state(model, ActionModel().fit(X, groups=groups))
 
 
-def test_many_of_one_group_before_another():
-    """Trials that were dropped before the second group came do not enter the threshold."""
-    X, groups = curves(150, n_frames=10), [0] * 140 + [1] * 10
-    model = in_portions(X, groups, [100, 140])
-    known = [i for i in slow_choice(groups[:140]) if i < 140]
-    kept = slow_choice(groups)
-    compared = [*known, *range(140, 150)]
-    others = [[X[j] for j in kept if groups[j] != groups[i]] for i in compared]
-    weights = slow_weights(X[kept], np.array(groups)[kept])
-    values = [slow_dissimilarity(X[i], y, weights) for i, y in zip(compared, others, strict=True)]
-    np.testing.assert_allclose(model.threshold_, slow_threshold(values, 0.95))
-
-
 # -- all or nothing ---------------------------------------------------------------------
 
 
@@ -220,11 +201,7 @@ def test_many_of_one_group_before_another():
         (np.full((3, 10, 2), np.nan), None, "Trial 0 is NaN in every frame and feature"),
         (np.zeros((3, 10, 3)), None, "3 features a frame, but ActionModel is expecting 2"),
         (curves(3, n_frames=10), ["a", None, "b"], r"groups\[1\] is missing, None"),
-        (
-            curves(3, n_frames=10),
-            ["a"],
-            "one label for each trial, got 1 for 3",
-        ),
+        (curves(3, n_frames=10), ["a"], "one label for each trial, got 1 for 3"),
         (np.zeros((3, 10)), None, "wrap one sequence as"),
         ([], None, "Found 0 trials"),
     ],
@@ -235,12 +212,14 @@ def test_a_refused_portion_does_not_change_the_model(X, groups, message):
     with pytest.raises(ValueError, match=message):
         model.partial_fit(X, groups=groups)
     assert pickle.dumps(model) == before
-    model = ActionModel()
+
+
+def test_a_refused_first_portion_leaves_no_model():
+    model, X = ActionModel(), curves(6, n_frames=12)
     with pytest.raises(ValueError, match="Trial 1 has 9 frames"):
         model.partial_fit([np.zeros((10, 2)), np.zeros((9, 2))])
     with pytest.raises(NotFittedError):
-        model.score_samples(curves(3, n_frames=10))
-    X = curves(6, n_frames=12)
+        model.score_samples(X)
     assert_same_state(model.partial_fit(X), ActionModel().fit(X))
 
 

@@ -1,6 +1,7 @@
-"""Dissimilarity and threshold of the model: against slow loops, closed forms and real people."""
+"""Dissimilarity and threshold of the model: against slow loops and closed forms, with gaps too."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.stats import t as student
@@ -19,7 +20,26 @@ def curves(n, seed=0, n_frames=40, spread=0.2):
     )
 
 
+def hide(X, share=0.3, length=12, seed=0):
+    """Copies of trials: some features of some are hidden for a while."""
+    rng, X = np.random.default_rng(seed), X.copy()
+    for x in X:
+        for k in range(X.shape[2]):
+            if rng.random() < share:
+                start = rng.integers(0, len(x) - length)
+                x[start : start + length, k] = np.nan
+    return X
+
+
 # -- the dissimilarity, written out -----------------------------------------------------
+
+
+def filled(x, mean):
+    """Deviations from the mean go on in straight lines."""
+    if not np.isnan(x).any():
+        return x
+    gaps = pd.DataFrame(x - mean).interpolate(limit_direction="both").fillna(0)
+    return mean + gaps.to_numpy()
 
 
 def slow_velocity(x):
@@ -50,38 +70,45 @@ def slow_weights(X, groups):
     return scale, min(0.1, 0.05 * np.median(apart) / np.median(offset))
 
 
-def slow_ratio(y, z, weights):
+def slow_ratio(y, z, weights, mean=0):
+    """In sums over what was seen of both trials, which are filled by the mean."""
     scale, mean_weight = weights
-    y, z = scale * y, scale * z
-    apart = ((y - y.mean(0) - z + z.mean(0)) ** 2).sum()
-    apart += mean_weight * len(y) * ((y.mean(0) - z.mean(0)) ** 2).sum()
-    moved = ((y - y.mean(0)) ** 2).sum() + ((z - z.mean(0)) ** 2).sum()
+    both = ~np.isnan(y) & ~np.isnan(z)
+    y, z = (scale * filled(x, mean) for x in (y, z))
+    a, b = y - y.mean(0), z - z.mean(0)
+    apart = ((a - b) ** 2)[both].sum()
+    apart += mean_weight * (both.sum(0) * (y.mean(0) - z.mean(0)) ** 2).sum()
+    moved = (a**2 + b**2)[both].sum()
     v, w = slow_velocity(y), slow_velocity(z)
-    return apart / moved / 2 + ((v - w) ** 2).sum() / ((v**2).sum() + (w**2).sum()) / 2
+    return apart / moved / 2 + ((v - w) ** 2)[both].sum() / (v**2 + w**2)[both].sum() / 2
 
 
-def slow_dissimilarity(y, others, weights):
-    return np.mean(sorted(slow_ratio(y, z, weights) for z in others)[:3])
+def slow_dissimilarity(y, others, weights, mean=0):
+    return np.mean(sorted(slow_ratio(y, z, weights, mean) for z in others)[:3])
 
 
-def slow_threshold(values, coverage):
+def slow_threshold(values, coverage, prior=0.12):
     logs, n = np.log(values), len(values)
-    variance = (((logs - logs.mean()) ** 2).sum() + 3 * 0.12) / (n - 1 + 3)
+    variance = (((logs - logs.mean()) ** 2).sum() + 3 * prior) / (n - 1 + 3)
     quantile = student(n + 2).ppf(coverage)
     return np.exp(logs.mean() + quantile * np.sqrt(variance + variance / n))
 
 
-@pytest.mark.parametrize("grouped", [False, True])
-@pytest.mark.parametrize("coverage", [0.8, 0.95])
-def test_dissimilarity_and_threshold_equal_slow_loops(grouped, coverage):
-    X, new = curves(12), curves(70, seed=1, spread=0.4)
+@pytest.mark.parametrize(("grouped", "coverage"), [(False, 0.8), (True, 0.95)])
+@pytest.mark.parametrize("share", [0, 0.4])
+def test_dissimilarity_and_threshold_equal_slow_loops(grouped, coverage, share):
+    """Of new trials some have gaps, whether those of the model have some or not."""
+    X, new = hide(curves(12), share), curves(70, seed=1, spread=0.4)
+    new[50:] = hide(new[50:], share=0.8, seed=4)
     groups = np.array(list("aabbbcddddee")) if grouped else None
     model = ActionModel(coverage=coverage).fit(X, groups=groups)
-    codes = np.arange(12) if groups is None else groups
-    weights = slow_weights(X, codes)
-    left = [slow_dissimilarity(x, X[codes != c], weights) for x, c in zip(X, codes, strict=True)]
+    codes, mean = np.arange(12) if groups is None else groups, np.nanmean(X, axis=0)
+    weights = slow_weights([filled(x, mean) for x in X], codes)
+    held_out = zip(X, codes, strict=True)
+    left = [slow_dissimilarity(x, X[codes != c], weights, mean) for x, c in held_out]
+    np.testing.assert_allclose(model.dissimilarities_, left, rtol=1e-9)
     np.testing.assert_allclose(model.threshold_, slow_threshold(left, coverage), rtol=1e-9)
-    expected = np.array([slow_dissimilarity(x, X, weights) for x in new])
+    expected = np.array([slow_dissimilarity(x, X, weights, mean) for x in new])
     np.testing.assert_allclose(model.dissimilarity(new), expected, rtol=1e-9)
     decisions = np.log(model.threshold_) - np.log(expected)
     np.testing.assert_allclose(model.decision_function(new), decisions, atol=1e-8)
@@ -116,25 +143,22 @@ def test_dissimilarity_of_equal_still_opposite_and_distant_trials():
 # -- the threshold ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("n", "coverage"), [(2, 0.8), (20, 0.95)])
-def test_upper_limit_of_few_values_has_its_nominal_coverage(n, coverage):
-    """Exactly so where variances differ between actions as three values tell them."""
-    rng = np.random.default_rng(0)
-    spread = np.sqrt(3 * 0.07 / rng.chisquare(3, (6000, 1)))
-    logs = spread * rng.standard_normal((6000, n + 1))
-    limits = [log_moments(np.exp(x[:-1])).upper_limit(coverage) for x in logs]
-    held = [x[-1] <= np.log(limit) for x, limit in zip(logs, limits, strict=True)]
-    assert abs(np.mean(held) - coverage) < 0.01
+@pytest.mark.parametrize(("n", "coverage"), [(1, 0.8), (2, 0.8), (20, 0.95)])
+def test_upper_limit_of_few_values_has_a_smaller_prior_variance(n, coverage):
+    values = np.exp(np.random.default_rng(n).standard_normal(n))
+    expected = slow_threshold(values, coverage, prior=0.07)
+    assert log_moments(values).upper_limit(coverage) == pytest.approx(expected)
 
 
 # -- alone or together ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("n_features", [1, 16])
-def test_dissimilarity_does_not_depend_on_other_trials(n_features):
+@pytest.mark.parametrize(("n_features", "share"), [(1, 0), (16, 0), (3, 0.2)])
+def test_dissimilarity_does_not_depend_on_other_trials(n_features, share):
+    """Nor on their gaps."""
     rng = np.random.default_rng(0)
     X = np.cumsum(rng.standard_normal((30, 57, n_features)), axis=1)
-    new = np.cumsum(rng.standard_normal((75, 57, n_features)), axis=1)
+    new = hide(np.cumsum(rng.standard_normal((75, 57, n_features)), axis=1), share)
     model, order = ActionModel().fit(X), rng.permutation(75)
     together = model.dissimilarity(new)
     alone = np.concatenate([model.dissimilarity([x]) for x in new])
