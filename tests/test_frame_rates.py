@@ -3,6 +3,7 @@
 import inspect
 import re
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -42,61 +43,53 @@ METHODS = ("fit", "fit_transform", "match", "transform")
 
 def with_files(tmp_path):
     """For each function a call that takes ``frame_rate``, or what it calls it."""
-    path = tmp_path / "a.trc"
+    path, page = tmp_path / "a.trc", tmp_path / "a.html"
     io.write_motion(path, WALK.data[0], WALK.skeleton, frame_rate=100)
+    norm = {"norm": "A", "groups": GAIT.person}
     calls = {
-        "compare_events": lambda **k: comparison.compare_events(X, EVENTS, **k),
-        "compare_groups": lambda **k: comparison.compare_groups(DENSE, X, GAIT.group, **k),
-        "compare_to_norm": lambda **k: comparison.compare_to_norm(
-            DENSE, X, GAIT.group, norm="A", groups=GAIT.person, **k
+        "compare_events": partial(comparison.compare_events, X, EVENTS),
+        "compare_groups": partial(comparison.compare_groups, DENSE, X, GAIT.group),
+        "compare_to_norm": partial(comparison.compare_to_norm, DENSE, X, GAIT.group, **norm),
+        "make_bending": partial(datasets.make_bending, 2),
+        "make_gait": partial(datasets.make_gait, 2),
+        "make_walk": partial(datasets.make_walk, 1),
+        "GaitDisplay.from_positions": partial(
+            display.GaitDisplay.from_positions, WALK.data[0], WALK.skeleton
         ),
-        "make_bending": lambda **k: datasets.make_bending(2, **k),
-        "make_gait": lambda **k: datasets.make_gait(2, **k),
-        "make_walk": lambda **k: datasets.make_walk(1, **k),
-        "ActionModelDisplay.from_estimator": lambda **k: display.ActionModelDisplay.from_estimator(
-            MODEL, X, **k
-        ),
-        "CycleDisplay.from_estimator": lambda **k: display.CycleDisplay.from_estimator(
-            CYCLES, X[:1], **k
-        ),
-        "GaitDisplay.from_positions": lambda **k: display.GaitDisplay.from_positions(
-            WALK.data[0], WALK.skeleton, **k
-        ),
-        "GroupDisplay.from_estimator": lambda **k: display.GroupDisplay.from_estimator(
-            DENSE, X, **k
-        ),
-        "LagDisplay.from_estimator": lambda **k: display.LagDisplay.from_estimator(PARTS, X, **k),
-        "SynchronizationDisplay.from_estimator": lambda **k: (
-            display.SynchronizationDisplay.from_estimator(DENSE, X, **k)
-        ),
-        "gait_events": lambda **k: gait.gait_events(WALK.data, WALK.skeleton, **k),
-        "gait_parameters": lambda **k: gait.gait_parameters(WALK.data, WALK.skeleton, **k),
-        "keyframes_from_events": lambda **k: io.keyframes_from_events(X, EVENTS, **k),
-        "read_motion": lambda **k: io.read_motion(path, **k),
-        "from_poses": lambda **k: io.from_poses(None, **k),
-        "write_motion": lambda **k: io.write_motion(path, WALK.data[0], WALK.skeleton, **k),
+        "gait_events": partial(gait.gait_events, WALK.data, WALK.skeleton),
+        "gait_parameters": partial(gait.gait_parameters, WALK.data, WALK.skeleton),
+        "keyframes_from_events": partial(io.keyframes_from_events, X, EVENTS),
+        "read_motion": partial(io.read_motion, path),
+        "from_poses": partial(io.from_poses, None),
+        "write_motion": partial(io.write_motion, path, WALK.data[0], WALK.skeleton),
         "MotionTracker": lambda **k: live.MotionTracker(**k).fit(X),
         "OnlineSynchronizer": lambda **k: live.OnlineSynchronizer(**k).fit(X),
-        "write_player": lambda **k: report.write_player(
-            tmp_path / "a.html", WALK.data, WALK.skeleton, **k
-        ),
-        "write_report": lambda **k: report.write_report(tmp_path / "a.html", DENSE, X, **k),
-        "DenseSynchronizer.calibrate": lambda **k: DENSE.calibrate(X, GAIT.keyframes, **k),
-        "DenseSynchronizer.disparity_space": lambda **k: DENSE.disparity_space(X, **k),
-        "Match.facts_of": lambda **k: MATCH.facts_of(X, **k),
-        "Match.interval": lambda **k: MATCH.interval(**k),
-        "Match.offsets_in": lambda **k: MATCH.offsets_in("percent", **k),
-        "Match.seconds": lambda **k: MATCH.seconds(X, **k),
-        "Match.to_frame": lambda **k: MATCH.to_frame(**k),
-        "PartSynchronizer.lags": lambda **k: PARTS.lags(X, unit="frames", **k),
-        "PartSynchronizer.match_parts": lambda **k: PARTS.match_parts(X, **k),
+        "write_player": partial(report.write_player, page, WALK.data, WALK.skeleton),
+        "write_report": partial(report.write_report, page, DENSE, X),
+        "DenseSynchronizer.calibrate": partial(DENSE.calibrate, X, GAIT.keyframes),
+        "DenseSynchronizer.disparity_space": partial(DENSE.disparity_space, X),
+        "Match.facts_of": partial(MATCH.facts_of, X),
+        "Match.interval": MATCH.interval,
+        "Match.offsets_in": partial(MATCH.offsets_in, "percent"),
+        "Match.seconds": partial(MATCH.seconds, X),
+        "Match.to_frame": MATCH.to_frame,
+        "PartSynchronizer.lags": partial(PARTS.lags, X, unit="frames"),
+        "PartSynchronizer.match_parts": partial(PARTS.match_parts, X),
         "TimingChannel": lambda **k: CHANNEL.set_params(**k).fit(X),
         "CycleSegmenter": lambda **k: takes.CycleSegmenter(**k).fit(X),
         "find_trials": lambda frame_rate: takes.find_trials(
             DENSE, X, frame_rate=50, pattern_rate=frame_rate
         ),
-        "to_trials": lambda **k: to_trials(TIMED, time="t", **k),
+        "to_trials": partial(to_trials, TIMED, time="t"),
     }
+    for kind, estimator, trials in (
+        (display.ActionModelDisplay, MODEL, X),
+        (display.CycleDisplay, CYCLES, X[:1]),
+        (display.GroupDisplay, DENSE, X),
+        (display.LagDisplay, PARTS, X),
+        (display.SynchronizationDisplay, DENSE, X),
+    ):
+        calls[f"{kind.__name__}.from_estimator"] = partial(kind.from_estimator, estimator, trials)
     for sync in (DENSE, LINEAR, PARTS):
         name = type(sync).__name__
         calls |= {f"{name}.{method}": getattr(sync, method) for method in METHODS}

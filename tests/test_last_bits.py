@@ -12,7 +12,8 @@ from sklearn_motionsync.live.members import weighted_median
 from sklearn_motionsync.synchronizers import blend_trials
 from sklearn_motionsync.takes import CycleSegmenter
 
-SEEDS = range(2)
+# Each test is of two seeds.
+pytestmark = pytest.mark.parametrize("seed", range(2))
 
 
 def shaken(values, seed):
@@ -26,7 +27,6 @@ def curve(n_frames):
     return np.column_stack([np.sin(3 * t), t**2])
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
     ("lengths", "expected"), [((101, 108), 105), ((78, 117), 98), ((80, 90), 85)]
 )
@@ -38,7 +38,6 @@ def test_blend_of_half_a_frame_has_one_length(lengths, expected, seed):
     assert len(blend_trials(match, list(map(curve, lengths)), [0.5, 0.5])) == expected
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("rate", "expected"), [(None, 13), (2.0, 25), (0.5, 7)])
 def test_resampled_recordings_have_one_length(rate, expected, seed):
     # Frames come once a unit of time; the last one is late by half of it.
@@ -49,7 +48,6 @@ def test_resampled_recordings_have_one_length(rate, expected, seed):
     assert len(found) == expected + (rate is None)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 def test_events_between_two_frames_cut_at_one_of_them(seed):
     df = pd.DataFrame({"knee": np.arange(80.0)})
     frames = shaken([10.5, 31.5, 60.5], seed)
@@ -65,7 +63,6 @@ def cycles(n_cycles, period):
     return np.concatenate([x, -x], axis=1)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("period", [40, 42.5])
 def test_cycles_are_counted_and_cut_alike(period, seed):
     x = cycles(4, period)
@@ -77,13 +74,11 @@ def test_cycles_are_counted_and_cut_alike(period, seed):
     assert tables[0]["complete"].sum() >= 3
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 def test_first_component_reaches_its_share_of_the_variance(seed):
     turned, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(2, 2)))
     x = np.array([[3, 1], [3, -1], [-3, 1], [-3, -1]]) @ turned
     assert ASpace(0.9).fit([shaken(x, seed)]).n_components_ == 1
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 def test_median_of_equal_weights_is_the_lower_one_of_two(seed):
     assert weighted_median(np.arange(10.0), shaken(np.full(10, 0.1), seed)) == 4

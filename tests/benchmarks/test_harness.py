@@ -125,14 +125,6 @@ def powers():
     return np.array([99 * (FRAMES / 99) ** k for k in (0.5, 0.8, 1.25, 2.0)])
 
 
-def test_true_warps_have_no_error_and_no_spread(harness, powers):
-    for at in (7, 50, 93):
-        errors, spread = harness.on_time_line(powers, powers[:, at])
-        assert len(errors) == 12
-        np.testing.assert_allclose(errors, 0, rtol=0, atol=1e-4)
-        assert spread == pytest.approx(0, abs=1e-4)
-
-
 def test_warps_that_are_late_miss_by_what_they_are_late(harness):
     moments, late = np.array([40.0, 44, 49, 61]), np.array([0.0, 3, 9, 17])
     # On the time line: 40, 41, 40 and 44. The six distances, each of two pairs, are 0 to 4.
@@ -143,10 +135,16 @@ def test_warps_that_are_late_miss_by_what_they_are_late(harness):
     assert spread == pytest.approx(np.sqrt(10.75 / 3), abs=1e-4)
 
 
-def test_clips_without_the_moment_are_left_out(harness, powers):
-    moments = np.where([True, False, True, True], powers[:, 30], np.nan)
-    errors, spread = harness.on_time_line(powers, moments)
-    assert len(errors) == 6
+@pytest.mark.parametrize(
+    ("at", "shown", "n_pairs"),
+    [(7, [True] * 4, 12), (93, [True] * 4, 12), (30, [True, False, True, True], 6)],
+)
+def test_true_warps_have_no_error_and_no_spread(harness, at, shown, n_pairs):
+    """Frame p of the pattern is frame 99 (p / 99)^k of a clip; some do not show the moment."""
+    powers = np.array([99 * (FRAMES / 99) ** k for k in (0.5, 0.8, 1.25, 2.0)])
+    errors, spread = harness.on_time_line(powers, np.where(shown, powers[:, at], np.nan))
+    assert len(errors) == n_pairs
+    np.testing.assert_allclose(errors, 0, rtol=0, atol=1e-4)
     assert spread == pytest.approx(0, abs=1e-4)
 
 

@@ -34,19 +34,6 @@ def recordings(recognition, bunch):
     return recognition.as_recordings("few", bunch)
 
 
-class Nearest:
-    """Scores of one number a clip: minus the distance to the mean of a class."""
-
-    def __init__(self, values, actions):
-        self.values, self.actions, self.seen = values, actions, []
-
-    def __call__(self, train, test):
-        self.seen.append((set(train), set(test)))
-        classes = np.unique(self.actions[train])
-        means = [self.values[train][self.actions[train] == c].mean() for c in classes]
-        return classes, -np.abs(self.values[test][:, np.newaxis] - means)
-
-
 # -- folds ------------------------------------------------------------------------------
 
 
@@ -59,10 +46,8 @@ def test_published_splits_are_disjoint(recognition, tmp_path):
 
 
 def test_leave_one_actor_out_splits(recognition):
-    actors = np.array(["b", "a", "b", "c"])
-    left_out = [
-        (train.tolist(), test.tolist()) for train, test in recognition.actors_left_out(actors)
-    ]
+    splits = recognition.actors_left_out(np.array(["b", "a", "b", "c"]))
+    left_out = [(train.tolist(), test.tolist()) for train, test in splits]
     assert left_out == [([0, 2, 3], [1]), ([1, 3], [0, 2]), ([0, 1, 2], [3])]
 
 
@@ -70,16 +55,17 @@ def test_leave_one_actor_out_splits(recognition):
 
 
 def test_auc_of_an_unknown_action(recognition, recordings):
-    values = np.array([0.0, 0, 0, 0, 0, 0, 9, 9, 9, 9, 9, 9])
-    decide = Nearest(values, recordings.actions)
-    one, (train, test) = (
-        recognition.Scored(decide),
-        (np.arange(0, 12, 2), np.arange(1, 12, 2)),
-    )
-    args = one, recordings.actions, "rising", train, test
-    assert recognition.unknown_area(*args) == 1
-    assert decide.seen == [({0, 2, 4}, set(test))]
-    assert np.isnan(recognition.unknown_area(one, recordings.actions, "rising", train, test[3:]))
+    """By scores of one number a clip, which are known."""
+    seen, train, test = [], np.arange(0, 12, 2), np.arange(1, 12, 2)
+
+    def decide(train, test):
+        seen.append((set(train), set(test)))
+        return np.array(["bending"]), np.where(test < 6, 0.0, -9.0)[:, np.newaxis]
+
+    args = recognition.Scored(decide), recordings.actions, "rising", train
+    assert recognition.unknown_area(*args, test) == 1
+    assert seen == [({0, 2, 4}, set(test))]
+    assert np.isnan(recognition.unknown_area(*args, test[3:]))
 
 
 # -- recognition ------------------------------------------------------------------------

@@ -8,35 +8,25 @@ import sys
 from pathlib import Path
 
 import pytest
-from sklearn.pipeline import make_pipeline
+import sklearn_motionsync
+from sklearn.pipeline import Pipeline
 from sklearn.utils import estimator_html_repr
-from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    JointPositions,
-    LinearSynchronizer,
-    PartSynchronizer,
-    Skeleton,
-)
 from sklearn_motionsync.utils.doc_links import DOCUMENTATION
 
-ESTIMATORS = [
-    ActionModel(),
-    ASpace(),
-    DenseSynchronizer(),
-    DirectionCosines(Skeleton.paper()),
-    JointPositions(Skeleton.paper()),
-    LinearSynchronizer(),
-    PartSynchronizer(),
-]
+from estimators import EVERY
 
 
-def test_html_diagram_of_a_pipeline_links_every_step():
-    html = estimator_html_repr(make_pipeline(*ESTIMATORS[:0:-1], ESTIMATORS[0]))
-    pages = set(re.findall(rf"{DOCUMENTATION}/reference/sklearn_motionsync\.(\w+)\.html", html))
-    assert pages == {type(estimator).__name__ for estimator in ESTIMATORS}
+def test_html_diagram_links_every_estimator():
+    """Those of a room whose names are not at the top have their page under the room."""
+    ours = [each for each in EVERY if type(each).__module__.startswith("sklearn_motionsync.")]
+    html = estimator_html_repr(Pipeline([(f"step{k}", each) for k, each in enumerate(ours)]))
+    pages = set(re.findall(rf"{DOCUMENTATION}/reference/([\w.]+)\.html", html))
+    names = [(type(each).__module__.split("."), type(each).__name__) for each in ours]
+    expected = {
+        f"{package}.{name}" if name in sklearn_motionsync.__all__ else f"{package}.{room}.{name}"
+        for (package, room, _), name in names
+    }
+    assert pages == expected
 
 
 # -- the notebook of the examples -----------------------------------------------------------
@@ -83,13 +73,8 @@ def test_notebook_outputs_equal_the_stored_ones(notebook):
 
 
 def test_notebook_synchronises_trials(notebook):
-    (table,) = (
-        "".join(output["data"]["text/plain"])
-        for cell in notebook[1]
-        for output in cell["outputs"]
-        if "aligned" in "".join(output.get("data", {}).get("text/plain", ""))
-        and "%" in "".join(output["data"]["text/plain"])
-    )
+    shown = ["".join(o["data"].get("text/plain", "")) for c in notebook[1] for o in c["outputs"]]
+    (table,) = [text for text in shown if "aligned" in text and "%" in text]
     left = [int(share) for share in re.findall(r"(\d+)%", table)]
     assert len(left) == 6
     assert max(left) < 50

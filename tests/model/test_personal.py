@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionDetector, ActionModel, ASpace, DenseSynchronizer
+from sklearn_motionsync import ActionDetector, ActionModel, ASpace, DenseSynchronizer, Match
 from sklearn_motionsync.model.similarity import PersonalReference
 from test_similarity import slow_ratio, slow_threshold
 
@@ -123,19 +123,18 @@ def test_a_detector_takes_a_reference_as_it_was_recorded():
     detector = ActionDetector(pipe).fit(raw(X), groups=GROUPS)
     mine = NEW[PERSONS == 1]
     bent = mine[3:] + 0.4 * np.sin(np.linspace(0, 6 * np.pi, P))[:, np.newaxis]
-    report = detector.report(raw([*mine[3:], *bent], 5), reference=raw(mine[:3], 6))
+    good, new = raw(mine[:3], 6), raw([*mine[3:], *bent], 5)
+    report = detector.report(new, reference=good)
     assert list(report.columns)[:3] == ["movement", "own", "course"]
     assert (report["reason"][:5] == "").sum() >= 4
     assert report["reason"][5:].str.contains("unlike the reference").all()
-    predicted = detector.predict(raw([*mine[3:], *bent], 5), reference=raw(mine[:3], 6))
+    predicted = detector.predict(new, reference=good)
     np.testing.assert_array_equal(predicted, np.where(report["reason"] == "", 1, -1))
     # The statistic is that of a model of the poses, with the limit of its share.
-    curves = detector.estimator_[1].match(detector.estimator_[0].transform(raw(X))).warp(raw(X))
+    curves, own, warped = (
+        Match.from_estimator(detector.estimator_, some).warp(some) for some in (raw(X), good, new)
+    )
     model = ActionModel(coverage=1 - 0.05 / 4).fit(curves, groups=GROUPS)
-    match = detector.estimator_[1].match(detector.estimator_[0].transform(raw(mine[:3], 6)))
-    own = match.warp(raw(mine[:3], 6))
-    new = raw([*mine[3:], *bent], 5)
-    warped = detector.estimator_[1].match(detector.estimator_[0].transform(new)).warp(new)
     unlike = np.exp(-model.decision_function(warped, reference=own))
     np.testing.assert_allclose(report["own"], unlike, rtol=1e-8)
 
@@ -147,8 +146,8 @@ def test_a_detector_takes_a_reference_as_it_was_recorded():
 def test_exercises_of_people_done_right_and_wrong(benchmark, real_data):
     """A person held out; shoulder rotation, where people differ more than right from wrong."""
     read = benchmark("exercises").read_exercises(real_data)
-    found = {name: rest for name, *rest in read}
-    poses, people, correct, takes = found["shoulder rotation"]
+    (found,) = [rest for name, *rest in read if name == "shoulder rotation"]
+    poses, people, correct, takes = found
     train = np.flatnonzero((people != "s03") & correct & (takes % 2 == 1))
     mine = np.flatnonzero(people == "s03")
     right, rest = mine[correct[mine]][:3], np.setdiff1d(mine, mine[correct[mine]][:3])

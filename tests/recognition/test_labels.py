@@ -34,16 +34,6 @@ PAIRS = {
 }
 
 
-def fit(pair):
-    """A classifier of five trials a class, and its classes as they were given."""
-    given = list(pair)
-    if isinstance(pair, list):
-        y = [given[0]] * 5 + [given[1]] * 5
-    else:
-        y = pair.take(np.repeat([0, 1], 5))
-    return ActionClassifier(n_frames=4).fit(X, y), given
-
-
 def equal(found, given):
     """Whether two labels are the same: numbers as Python compares them, exactly."""
     found, given = (
@@ -58,7 +48,10 @@ def equal(found, given):
 @pytest.mark.parametrize("name", PAIRS)
 def test_rejected_trials_never_have_a_class(name):
     pair, kind = PAIRS[name]
-    classifier, given = fit(pair)
+    given = list(pair)
+    y = [label for label in given for _ in range(5)]
+    y = y if isinstance(pair, list) else pair.take(np.repeat([0, 1], 5))
+    classifier = ActionClassifier(n_frames=4).fit(X, y)
     plain = classifier.predict(X)
     assert all(equal(a, given[i // 5]) for i, a in enumerate(plain))
     scores = classifier.score_samples(X)
