@@ -83,10 +83,8 @@ class Text(Page):
 
 def capture_figures(patch):
     """The list that will hold the figures of reports."""
-    figures, picture = [], report.picture
-    patch.setattr(
-        report, "picture", lambda figure, text: (figures.append(figure), picture(figure, text))[1]
-    )
+    figures, draw = [], report.picture
+    patch.setattr(report, "picture", lambda *given: figures.append(given[0]) or draw(*given))
     return figures
 
 
@@ -131,7 +129,6 @@ def test_the_set_and_what_was_left_out(groups):
     seconds = [(len(x) - 1) / 100 for x, g in zip(TRIALS, GAIT.group, strict=True) if g == "B"]
     assert f"B 4 8 {np.mean(seconds):.2f} {np.std(seconds, ddof=1):.4f}" in groups.text
     table = groups.table("trials")
-    assert table["trial"].tolist() == [f"walk {k}" for k in range(16)]
     assert table["seconds"].tolist() == [(len(x) - 1) / 100 for x in TRIALS]
     assert table["pattern"].tolist() == [k == pattern for k in range(16)]
 
