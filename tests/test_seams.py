@@ -112,12 +112,6 @@ def blended(s):
     return positions - positions[:1, :1]
 
 
-def verdicts(s):
-    """What differs from a norm."""
-    people = {"norm": s.norm, "groups": s.groups, "unit": "frames"}
-    return compare_to_norm(s.sync, s.X, s.y, **people, **s.params).verdicts
-
-
 # What each function finds. Of those in BY_TRIAL the rows, or the first axis, are trials.
 CALLS = {
     "ActionDetector.fit": lambda s: (
@@ -200,7 +194,10 @@ CALLS = {
         s.sync, s.X, s.y, groups=s.groups, n_permutations=99, **s.params
     ).to_frame(),
     "compare_to_norm": lambda s: (
-        verdicts(s)[["p", "p_shape", "p_timing"]].sort_values("p").to_numpy()
+        compare_to_norm(s.sync, s.X, s.y, norm=s.norm, groups=s.groups, unit="frames", **s.params)
+        .verdicts[["p", "p_shape", "p_timing"]]
+        .sort_values("p")
+        .to_numpy()
     ),
     "find_departures": lambda s: (
         find_departures(s.model, s.X, **s.params)[["kind", "limb", "first", "last", "size"]]
@@ -406,14 +403,11 @@ def test_a_match_is_of_its_trials(wrap, sync):
 
 def test_a_match_stays_that_of_its_fit():
     pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(51)).fit(GAIT.data)
-    match = Match.from_estimator(pipe, GAIT.data)
-    before = verdicts_of(match)
+    match, given = Match.from_estimator(pipe, GAIT.data), {"norm": "A", "groups": GAIT.person}
+    before = compare_to_norm(match, GAIT.data, GAIT.group, **given).departures
     pipe.set_params(densesynchronizer__n_frames=31).fit([10 * x for x in GAIT.data])
-    pd.testing.assert_frame_equal(verdicts_of(match), before)
-
-
-def verdicts_of(match):
-    return compare_to_norm(match, GAIT.data, GAIT.group, norm="A", groups=GAIT.person).departures
+    after = compare_to_norm(match, GAIT.data, GAIT.group, **given).departures
+    pd.testing.assert_frame_equal(after, before)
 
 
 def test_frame_rates_of_a_match_are_those_it_was_told(sync):

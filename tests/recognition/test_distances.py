@@ -29,28 +29,20 @@ def walks(n, n_features=3, seed=0, shortest=3, longest=60):
 
 # -- the distance, written out ----------------------------------------------------------
 
-RATES = np.arange(5)
-COSTS = {
-    "pose": {s: (1.0, 2.0, abs(s - 1.0)) for s in RATES},
-    "velocity": {s: ((0.8 + 0.2 * s) ** 2, 2 * (0.8 + 0.2 * s), (s - 1.0) ** 2) for s in RATES},
-    "elastic": {s: (float(s), 2 * np.sqrt(s), (s - 1.0) ** 2) for s in RATES},
-}
+COSTS = "pose", "velocity", "elastic"
 
 
-def slow_features(x, cost, n_frames, smoothing, normalize):
+def slow_features(x, cost, n_frames, normalize):
     at = np.linspace(0, len(x) - 1, n_frames)
     x = np.column_stack([np.interp(at, np.arange(len(x)), column) for column in x.T])
-    if cost != "pose":
-        x = oracle.slow_filter(x, smoothing * (n_frames - 1), 1)
-    if cost == "elastic":
-        x = x / np.sqrt(np.linalg.norm(x, axis=1, keepdims=True))
+    x = oracle.FEATURES[cost](x, 1.0, 0.06 * (n_frames - 1))
     return x / np.sqrt((x**2).sum(axis=1).mean()) if normalize else x
 
 
 def slow_distance(x, y, cost, n_frames, normalize, mu=0.003):
-    a, b = (slow_features(z, cost, n_frames, 0.06, normalize) for z in (x, y))
-    reach, ways = int(0.25 * n_frames), [(a, b), (b, a)]
-    return np.mean([oracle.plain_loops(*way, COSTS[cost], mu, 1, reach) for way in ways])
+    a, b = (slow_features(z, cost, n_frames, normalize) for z in (x, y))
+    settings = oracle.step_costs(cost, 4, 1), mu, 1, int(0.25 * n_frames)
+    return (oracle.plain_loops(a, b, *settings) + oracle.plain_loops(b, a, *settings)) / 2
 
 
 def distances_between(X, Y, cost, n_frames, **settings):
