@@ -2,7 +2,6 @@
 
 import base64
 import re
-import struct
 
 import numpy as np
 import pandas as pd
@@ -18,15 +17,13 @@ BENDS = make_bending(5, n_frames=40, random_state=0)
 PIPE = make_pipeline(DirectionCosines(BENDS.skeleton), DenseSynchronizer(31)).fit(BENDS.data)
 
 
-def whole_numbers(text, code):
-    """Numbers of two bytes."""
-    data = base64.b64decode(text)
-    return [number for (number,) in struct.iter_unpack(code, data)]
+def whole_numbers(text, dtype):
+    return np.frombuffer(base64.b64decode(text), dtype)
 
 
 def positions_of(data):
     """The points (n_frames_i, n_points, n_dims) of each trial."""
-    numbers = np.array(whole_numbers(data["positions"], "<h"), dtype=float)
+    numbers = whole_numbers(data["positions"], "<i2").astype(float)
     numbers[numbers == -32768] = np.nan
     points = (numbers * data["scale"]).reshape(-1, data["points"], data["dims"])
     return np.split(points, np.cumsum(data["counts"])[:-1])
@@ -70,7 +67,7 @@ def test_positions_are_those_given(tmp_path):
     assert data["dots"] == [15]
     assert data["durations"] == [(len(x) - 1) / 50 for x in BENDS.data]
     assert (data["seconds"], data["pace"]) == (True, 1)
-    tau = np.array(whole_numbers(data["warps"], "<H")).reshape(5, 31) / 65535
+    tau = whole_numbers(data["warps"], "<u2").reshape(5, 31) / 65535
     times = Match.from_estimator(PIPE, BENDS.data).times
     np.testing.assert_allclose(tau, times / 30, atol=2e-5)
 
@@ -163,10 +160,9 @@ def test_long_trials_have_fewer_frames_and_the_page_names_it(tmp_path, monkeypat
     monkeypatch.undo()
     whole = positions_of(write(tmp_path).data["player"])[0]
     at = np.linspace(0, len(whole) - 1, len(fewer))
-    low = np.minimum(at.astype(int), len(whole) - 2)
-    share = (at - low)[:, np.newaxis, np.newaxis]
-    between = (1 - share) * whole[low] + share * whole[low + 1]
-    np.testing.assert_allclose(fewer, between, atol=2e-4)
+    for j, k in np.ndindex(whole.shape[1:]):
+        between = np.interp(at, range(len(whole)), whole[:, j, k])
+        np.testing.assert_allclose(fewer[:, j, k], between, atol=2e-4)
 
 
 @pytest.mark.parametrize("most", [1, 9, 19, 20, 21, 31, 32, 100])
@@ -190,15 +186,16 @@ SPACE = pd.DataFrame(np.ones((9, 6)), columns=[f"j{k}_{axis}" for k in range(2) 
     [
         ({"X": [PLANE, SPACE], "skeleton": None}, ValueError, r"Trial 1 has \(2, 3\) points and"),
         ({"keyframes": [3] * 5}, ValueError, "keyframes|key-frames"),
-        ({"keyframes": [[3]] * 4 + [[len(BENDS.data[4])]]}, ValueError, "[Tt]rial 4"),
-        ({"keyframes": [[3]] * 4 + [[-1]]}, ValueError, "[Tt]rial 4"),
+        *(
+            ({"keyframes": [[3]] * 4 + [[k]]}, ValueError, "Trial 4: key-frames must .* included")
+            for k in (-1, len(BENDS.data[4]))
+        ),
         ({"X": BENDS.data * 5}, ValueError, r"X has 25 trials, .* 24 .* such as X\[:24\]"),
         ({"X": [BENDS.data[0], BENDS.data[1][:1]]}, ValueError, "Trial 1 has 1 frame"),
         ({"names": ["a"]}, ValueError, "names must be a list of text, one for each of the 5"),
         ({"match": Match([[0, 1, 2]])}, ValueError, "match must be of the 5 trials of X"),
         ({"match": DenseSynchronizer()}, ValueError, "not fitted"),
         ({"keyframes": [[3]]}, ValueError, r"list of 5 arrays .*, one a trial"),
-        ({"keyframes": [[3]] * 4 + [[99]]}, ValueError, "Trial 4: key-frames must .* included"),
         ({"skeleton": "acclaim"}, ValueError, "skeleton must be a Skeleton"),
         ({"frame_rate": 0}, ValueError, "frame_rate"),
         ({"X": []}, ValueError, "0 trials"),
