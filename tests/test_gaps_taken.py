@@ -100,15 +100,15 @@ def test_tags_of_frame_wise_are_those_of_its_transformer():
 def test_energies_of_movements_are_those_of_what_was_seen():
     rng = np.random.default_rng(0)
     X = np.cumsum(rng.standard_normal((5, 400, 3)), axis=1) * [1, 2, 3]
-    whole, _ = movement_energies(X)
     gaps = np.where(rng.random(X.shape) < 0.2, np.nan, X)
     gaps[1, :, 2] = np.nan
     found, floor = movement_energies(gaps)
-    np.testing.assert_allclose(np.delete(found, 1), np.delete(whole, 1), rtol=0.1)
+    own = np.nanvar(np.delete(gaps, 1, axis=0), axis=1)
+    np.testing.assert_allclose(np.delete(found, 1), own.sum(axis=1), rtol=1e-9)
     np.testing.assert_allclose(floor, 1e-9 * np.nanvar(gaps, axis=(0, 1)).sum(), rtol=1e-9)
-    # By hand: feature by feature about its own mean, and the third has its usual share.
-    own = np.nanvar(gaps[:, :, :2], axis=1)
-    third = np.nanvar(np.delete(gaps[:, :, 2], 1, axis=0), axis=1).mean()
-    shares = own.mean(axis=0)
-    np.testing.assert_allclose(found[1], own[1].sum() * (1 + third / shares.sum()), rtol=1e-9)
+    # A feature that is never shown has the share that it has in the others.
+    shown = np.nanvar(gaps[1, :, :2], axis=0)
+    usual = np.vstack([own[:, :2], shown]).mean(axis=0).sum()
+    share = 1 + own[:, 2].mean() / usual
+    np.testing.assert_allclose(found[1], shown.sum() * share, rtol=1e-9)
     assert movement_energies(np.where(np.isnan(gaps), np.nan, 7.0), floor)[0].max() == floor

@@ -136,11 +136,6 @@ CALLS = {
         s.sync[1].disparity_space(cosines(s), s.trial, **s.params).costs
     ),
     "DenseSynchronizer.fit": lambda s: s.fitted(DenseSynchronizer(31)).pattern_,
-    "DenseSynchronizer.fit_transform": lambda s: DenseSynchronizer(31).fit_transform(
-        cosines(s), **s.params
-    ),
-    "DenseSynchronizer.match": lambda s: s.sync[1].match(cosines(s), **s.params).times,
-    "DenseSynchronizer.transform": lambda s: s.sync[1].transform(cosines(s), **s.params),
     "FeatureHoldoutScorer": lambda s: FeatureHoldoutScorer()(s.sync, s.X, **s.params),
     "GroupDisplay.from_estimator": lambda s: (
         display.GroupDisplay.from_estimator(s.sync, s.X, s.y, groups=s.groups, **s.params).events
@@ -149,15 +144,6 @@ CALLS = {
         display.LagDisplay.from_estimator(part(s), s.X).lags.values
     ),
     "LinearSynchronizer.fit": lambda s: s.fitted(LinearSynchronizer(31)).keyframes_,
-    "LinearSynchronizer.fit_transform": lambda s: LinearSynchronizer(31).fit_transform(
-        cosines(s), **s.params
-    ),
-    "LinearSynchronizer.match": lambda s: (
-        s.fitted(LinearSynchronizer(31)).match(cosines(s), **s.params).times
-    ),
-    "LinearSynchronizer.transform": lambda s: s.fitted(LinearSynchronizer(31)).transform(
-        cosines(s), **s.params
-    ),
     "Match.from_estimator": lambda s: Match.from_estimator(s.sync, s.X, **s.params).times,
     "OnlineSynchronizer.fit": lambda s: (
         OnlineSynchronizer(DenseSynchronizer(31))
@@ -165,13 +151,10 @@ CALLS = {
         .mean_
     ),
     "PartSynchronizer.fit": lambda s: s.fitted(PARTS).keyframes_,
-    "PartSynchronizer.fit_transform": lambda s: clone(PARTS).fit_transform(cosines(s), **s.params),
     "PartSynchronizer.lags": lambda s: part(s)[1].lags(cosines(s)).values,
-    "PartSynchronizer.match": lambda s: s.fitted(PARTS).match(cosines(s), **s.params).times,
     "PartSynchronizer.match_parts": lambda s: (
         s.fitted(PARTS).match_parts(cosines(s), **s.params)["foot"].times
     ),
-    "PartSynchronizer.transform": lambda s: s.fitted(PARTS).transform(cosines(s), **s.params),
     "SkeletonDisplay.from_departures": lambda s: display.SkeletonDisplay.from_departures(
         s.model, s.X, trial=s.trial, **s.params
     ).titles[1:],
@@ -183,9 +166,6 @@ CALLS = {
         display.SynchronizationDisplay.from_estimator(s.sync, s.X, **s.params).match.times
     ),
     "TimingChannel.fit": lambda s: s.fitted(TIMING).synchronizer_.pattern_,
-    "TimingChannel.fit_transform": lambda s: clone(TIMING).fit_transform(cosines(s), **s.params),
-    "TimingChannel.match": lambda s: s.fitted(TIMING).match(cosines(s), **s.params).times,
-    "TimingChannel.transform": lambda s: s.fitted(TIMING).transform(cosines(s), **s.params),
     "TrellisDisplay.from_estimator": lambda s: (
         display.TrellisDisplay.from_estimator(s.sync, s.X, trial=s.trial, **s.params).warp
     ),
@@ -209,6 +189,13 @@ CALLS = {
 }
 PARTS = PartSynchronizer({"foot": [0, 1]}, synchronizer=DenseSynchronizer(31))
 TIMING = TimingChannel(DenseSynchronizer(31))
+for kind in (DenseSynchronizer(31), LinearSynchronizer(31), PARTS, TIMING):
+    name = type(kind).__name__
+    CALLS |= {
+        f"{name}.fit_transform": lambda s, k=kind: clone(k).fit_transform(cosines(s), **s.params),
+        f"{name}.match": lambda s, k=kind: s.fitted(k).match(cosines(s), **s.params).times,
+        f"{name}.transform": lambda s, k=kind: s.fitted(k).transform(cosines(s), **s.params),
+    }
 
 
 # Lags are of the whole body, on which key-frames have no influence.

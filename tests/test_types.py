@@ -182,12 +182,12 @@ partial(read_motion, "trial.amc", asf="trial.asf")
 to_trials(pd.DataFrame({"trial": [1, 1, 2, 2], "x": [0.0, 1, 0, 1]}), by="trial")
 """
 
-# Each of these is wrong: it raises an error, and mypy reports it.
+# Each of these is wrong: it raises an error, and mypy reports it. What strings estimators take is
+# tested above.
 WRONG = """\
 DenseSynchronizer(n_frames="many").fit(X)
 DenseSynchronizer(cost="posure").fit(X)
 DenseSynchronizer(30, "median", "auto").fit(X)
-DenseSynchronizer(pattern="mean").fit(X)
 DenseSynchronizer(frames=30).fit(X)
 DenseSynchronizer().fit(X, keyframes=5)
 DenseSynchronizer().fit(X, keyframes=[["5"], ["6"], ["7"]])
@@ -200,12 +200,9 @@ LinearSynchronizer().fit()
 sync.match(X).offsets_in("minutes")
 sync.match(X).seconds(X, frame_rate="fast")
 Match("0 1 2")
-TimingChannel(LinearSynchronizer(), "rate").fit(X)
 ActionModel(n_std="three").fit(X)
 ActionModel().fit(X, groups=3)
 ActionModel().fit(X).sample("all")
-ActionClassifier(reject_below="never").fit(X, [0, 1, 0])
-CycleSegmenter(not_cyclic="ignore").fit(X)
 OnlineSynchronizer(DenseSynchronizer).fit(X)
 Skeleton.paper(n_dims=4)
 Skeleton.papers()

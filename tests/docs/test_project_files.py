@@ -86,7 +86,7 @@ def test_project_urls_are_pages_of_the_manual():
 
 
 def test_publish_workflow_needs_no_secret():
-    text = (ROOT / ".github" / "workflows" / "publish.yml").read_text(encoding="utf-8")
+    text = (ROOT / ".github/workflows/publish.yml").read_text(encoding="utf-8")
     publish = yaml.safe_load(text)["jobs"]["publish"]
     assert publish["permissions"] == {"contents": "write", "id-token": "write"}
     assert not re.search(r"secrets\.|password|token:(?! write)", text)

@@ -67,23 +67,20 @@ FENCE = re.compile(r"^ *```+(?!\{(?!plot|code))(\S+)", re.MULTILINE)
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_every_block_is_run_by_a_test(name):
-    """Doctest runs ``pycon``; this file ``{plot}``, and ``python`` on the same pages."""
+    """Doctest runs ``pycon``; this file ``{plot}``, and ``python`` on the same pages.
+
+    CI runs the commands that install; a script has tests of its own.
+    """
     page = TEXTS[name]
     blocks = CODE.findall(page)
     assert set(FENCE.findall(page)) <= {"pycon", "python", "sh", "text", "{plot}"}
     assert [code for kind, code in blocks if kind == "pycon" and code[:4] != ">>> "] == []
     if name not in (*PAGES, *RUN_ON_FILES):
         assert [kind for kind, _ in blocks].count("python") == NOT_RUN.get(name, 0)
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_scripts_of_commands_exist(name):
-    """CI runs the commands that install; a script has tests of its own."""
-    commands = "".join(code for kind, code in CODE.findall(TEXTS[name]) if kind == "sh")
-    scripts = re.findall(r"python3? (\S+\.py)", commands)
-    rooms = ("examples", "benchmarks", "docs")
-    for script in scripts:
-        assert any((ROOT / room / Path(script).name).is_file() for room in rooms), script
+    commands = "".join(code for kind, code in blocks if kind == "sh")
+    for script in re.findall(r"python3? (\S+\.py)", commands):
+        rooms = [ROOT / room for room in ("examples", "benchmarks", "docs")]
+        assert any((room / Path(script).name).is_file() for room in rooms), script
 
 
 def test_tutorial_installs_the_declared_extras():

@@ -194,15 +194,12 @@ def turning(n=24, seed=0):
     return np.concatenate([height, *cones, number], axis=2)
 
 
-def norms(X, columns=((1, 4), (4, 7))):
-    return np.stack([np.linalg.norm(X[..., slice(*c)], axis=-1) for c in columns])
-
-
 def test_directions_keep_their_length_and_vary_as_those_of_people():
     X = turning(200)
     drawn = trials_of(X, 4000)
-    np.testing.assert_allclose(norms(drawn), 1, atol=1e-12)
-    # Numbers between them have the variance of all, and so have angles from any direction.
+    for columns in (slice(1, 4), slice(4, 7)):
+        np.testing.assert_allclose(np.linalg.norm(drawn[..., columns], axis=-1), 1, atol=1e-12)
+    # Numbers beside them have the variance of all, and so have angles from any direction.
     np.testing.assert_allclose(drawn[..., 7].var(axis=0), X[..., 7].var(axis=0), rtol=0.1)
     angles = [np.arccos(np.clip(Y[..., 1], -1, 1)) for Y in (drawn, X)]
     np.testing.assert_allclose(*(a.std(axis=0) for a in angles), rtol=0.15)

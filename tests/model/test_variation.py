@@ -113,12 +113,6 @@ def test_without_two_trials_of_anyone_the_variance_within_is_a_share():
     np.testing.assert_allclose(within_variance(X, groups)[:, 0], expected)
 
 
-def test_within_variance_is_positive_where_trials_are_equal():
-    X, groups = people([2, 2])
-    X[1], X[3] = X[0], X[2]
-    assert (within_variance(X, groups) > 0).all()
-
-
 def test_the_factor_of_two_trials():
     """Of one there is no variance to judge the other by: the log's is taken to be large."""
     X, groups = people([1, 1])
@@ -178,6 +172,7 @@ def test_variance_of_identical_trials_is_the_floor():
     assert inside(X[:1] * (1 + 1e-12), X, np.arange(5), 0.95) == 1
     assert inside(X[:1] * 1.01, X, np.arange(5), 0.95) == 0
     assert (mean_band(X, np.arange(5), 0.95, 0) <= 1e-12).all()
+    assert (within_variance(X, np.array([0, 0, 0, 1, 1])) > 0).all()
     # Nor is there any movement.
     assert (predictive_variance(np.zeros((3, 4, 1)), np.arange(3)) == 1e-9).all()
 
