@@ -96,20 +96,6 @@ def test_a_constant_feature_does_not_hide_the_others(trials):
     assert model.accepts(model.sample(5, frame=2, random_state=0), 2).all()
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1e6])
-def test_the_unit_of_the_features_changes_nothing(trials, scale):
-    """Densities change by the Jacobian, decisions do not; also of identical trials."""
-    same = np.repeat(trials[:1], 4, axis=0)
-    for X in (trials, same):
-        model, other = ActionModel().fit(X), ActionModel().fit(scale * X)
-        new = X[:3] + [[[0.0]], [[0.1]], [[5.0]]]
-        change = X[0].size * np.log(scale)
-        expected = model.score_samples(new) - change
-        np.testing.assert_allclose(other.score_samples(scale * new), expected, rtol=1e-6)
-        np.testing.assert_array_equal(other.predict(scale * new), model.predict(new))
-    assert model.predict(new).tolist() == [1, -1, -1]
-
-
 @pytest.mark.parametrize("value", [0.0, 1.0, 1e6])
 def test_model_of_identical_trials(value):
     X = [np.full((5, 2), value)] * 3

@@ -9,8 +9,6 @@ from sklearn_motionsync.recognition.kernel import (
     KernelRegression,
     align_weights,
     assign_folds,
-    change_extremes,
-    change_shares,
     changes_of,
     decision_values,
     fit_temperature,
@@ -19,47 +17,17 @@ from sklearn_motionsync.recognition.kernel import (
 )
 
 
-def walk(n_frames=50, n_features=3, seed=0):
-    return np.random.default_rng(seed).standard_normal((n_frames, n_features)).cumsum(axis=0)
-
-
-def convolved(x, reach):
-    """The changes of one feature (P,), which stands still before and after."""
-    still = np.r_[np.full(reach, x[0]), x, np.full(reach, x[-1])]
-    return np.convolve(still, [1, *[0] * (2 * reach - 1), -1], mode="valid")
-
-
-# -- changes ----------------------------------------------------------------------------
-
-
+# What summaries and shares are made of changes, tests/recognition/test_classifier.py writes out.
 @pytest.mark.parametrize(("n_frames", "reaches"), [(50, (2, 8)), (100, (4, 16)), (2, (1, 1))])
 def test_changes_equal_convolutions(n_frames, reaches):
-    x = walk(n_frames)
-    expected = [np.column_stack([convolved(f, r) for f in x.T]) for r in reaches]
-    np.testing.assert_allclose(changes_of(x), expected, atol=1e-12)
-
-
-def test_extremes_and_shares_equal_loops():
-    x, units = walk(), np.array([[1, 2, 0.5], [4, 3, 2]])
-    curves = [(convolved(f, r), r, i) for r in (2, 8) for i, f in enumerate(x.T)]
-    lowest, highest = [c.min() for c, *_ in curves], [c.max() for c, *_ in curves]
-    np.testing.assert_allclose(change_extremes(changes_of(x)), [*lowest, *highest])
-    expected = []
-    for level in (-2, -1, -0.3, 0, 0.3, 1, 2):
-        for curve, reach, i in curves:
-            unit = units[0 if reach == 2 else 1, i]
-            # Twice a logistic function, less 1.
-            over = [2 / (1 + np.exp(-4 * (c / unit - level))) - 1 for c in curve]
-            expected.append(np.mean(over))
-    np.testing.assert_allclose(change_shares(changes_of(x), units), expected, atol=1e-12)
-
-
-def test_a_feature_that_does_not_change_in_the_training_set_has_one_share_always():
-    units = np.ones((2, 3))
-    units[:, 1] = np.inf
-    still = [change_shares(changes_of(walk(seed=s)), units).reshape(7, 2, 3) for s in (1, 2)]
-    np.testing.assert_array_equal(still[0][..., 1], still[1][..., 1])
-    assert (still[0][..., 0] != still[1][..., 0]).all()
+    """Of trials that stand still before and after."""
+    x = np.random.default_rng(0).standard_normal((n_frames, 3)).cumsum(axis=0)
+    for changes, reach in zip(changes_of(x), reaches, strict=True):
+        still = np.pad(x, ((reach, reach), (0, 0)), mode="edge")
+        kernel = [1, *[0] * (2 * reach - 1), -1]
+        for found, curve in zip(changes.T, still.T, strict=True):
+            expected = np.convolve(curve, kernel, mode="valid")
+            np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 # -- weights ----------------------------------------------------------------------------
@@ -136,15 +104,6 @@ def test_regression_minimises_its_objective(n_classes, C):
     A, b = KernelRegression(K, C).fit(codes)
     assert objective(np.r_[A.ravel(), b])[0] <= best.fun * (1 + 1e-6)
     np.testing.assert_allclose(decision_values(K, A, b).sum(axis=1), 0, atol=1e-6)
-
-
-def test_fit_of_some_rows_equals_a_fit_without_the_others():
-    K, codes = points()
-    some = np.arange(len(K)) % 4 != 0
-    A, b = KernelRegression(K, 5).fit(codes, some)
-    alone = KernelRegression(K[np.ix_(some, some)], 5 * 24 / 18).fit(codes[some])
-    expected = decision_values(K[:, some], *alone)
-    np.testing.assert_allclose(decision_values(K, A, b), expected, atol=2e-3)
 
 
 def test_a_kernel_of_zeros_adds_nothing():
