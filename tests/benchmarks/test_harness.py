@@ -154,3 +154,11 @@ def test_true_warps_have_no_error_and_no_spread(harness, at, shown, n_pairs):
 )
 def test_moments_that_are_harmed_are_named(accuracy, after, sd, expected):
     assert accuracy.harm((np.array([1.0, 3]), 3.2), (np.array(after), sd)) == expected
+
+
+def test_ranks_are_taken_inside_each_event(benchmark):
+    """Both events rank errors rightly, though the widths of one are those of the other doubled."""
+    rank_correlation, errors = benchmark("intervals").rank_correlation, np.arange(1.0, 31)
+    small, large = (np.column_stack([errors, width * errors]) for width in (1, 2))
+    assert rank_correlation([small, large, small[:5, ::-1]]) == pytest.approx(1)
+    assert rank_correlation([small * [1, -1], large]) == pytest.approx(0)
