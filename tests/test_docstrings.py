@@ -46,45 +46,48 @@ def parameters(each):
     return {p.name: p for p in known if p.name not in ("self", "cls")}
 
 
-def assert_for_each(check, objects):
-    """Run a check on each object, and name all those for which it fails, with what it says."""
-    failures = []
-    for name, each in objects.items():
-        try:
-            check(name, each)
-        except AssertionError as error:
-            failures.append(f"{name}: {error}")
-    assert not failures, "\n".join(failures)
+def for_each(objects):
+    """Make of a check of one object a test of all, which names those that fail, and why."""
+
+    def of_all(check):
+        def test():
+            failures = []
+            for name, each in objects.items():
+                try:
+                    check(name, each)
+                except AssertionError as error:
+                    failures.append(f"{name}: {error}")
+            assert not failures, "\n".join(failures)
+
+        return test
+
+    return of_all
 
 
-def test_every_parameter_is_documented():
-    def check(name, each):
-        docstring = inspect.getdoc(each) or ""
-        assert docstring, "it has no docstring"
-        if inspect.isclass(each) and issubclass(each, tuple):
-            return  # a result: its fields are attributes
-        headings = ("Parameters", "Other Parameters")
-        sections = [list(described(docstring, heading)) for heading in headings]
-        assert sorted([*sections[0], *sections[1]]) == sorted(parameters(each))
-        for section in sections:
-            assert section == [key for key in parameters(each) if key in section]
-
-    assert_for_each(check, CALLABLES)
+@for_each(CALLABLES)
+def test_every_parameter_is_documented(name, each):
+    docstring = inspect.getdoc(each) or ""
+    assert docstring, "it has no docstring"
+    if inspect.isclass(each) and issubclass(each, tuple):
+        return  # a result: its fields are attributes
+    headings = ("Parameters", "Other Parameters")
+    sections = [list(described(docstring, heading)) for heading in headings]
+    assert sorted([*sections[0], *sections[1]]) == sorted(parameters(each))
+    for section in sections:
+        assert section == [key for key in parameters(each) if key in section]
 
 
-def test_defaults_are_those_of_the_signature():
-    def check(name, each):
-        said = described(inspect.getdoc(each) or "")
-        for key, parameter in parameters(each).items():
-            default = re.search(r"default=(.+)$", said.get(key, ""))
-            if parameter.default is parameter.empty or parameter.kind is parameter.VAR_KEYWORD:
-                assert default is None, f"{key} has no default, the docstring says {default[1]}"
-            elif said.get(key, "").strip() not in ("ignored", "Ignored"):
-                assert default, f"the docstring of {key} says no default={parameter.default!r}"
-                value = default[1].strip("`").rstrip(".")
-                assert value.replace("'", '"') == repr(parameter.default).replace("'", '"'), key
-
-    assert_for_each(check, CALLABLES)
+@for_each(CALLABLES)
+def test_defaults_are_those_of_the_signature(name, each):
+    said = described(inspect.getdoc(each) or "")
+    for key, parameter in parameters(each).items():
+        default = re.search(r"default=(.+)$", said.get(key, ""))
+        if parameter.default is parameter.empty or parameter.kind is parameter.VAR_KEYWORD:
+            assert default is None, f"{key} has no default, the docstring says {default[1]}"
+        elif said.get(key, "").strip() not in ("ignored", "Ignored"):
+            assert default, f"the docstring of {key} says no default={parameter.default!r}"
+            value = default[1].strip("`").rstrip(".")
+            assert value.replace("'", '"') == repr(parameter.default).replace("'", '"'), key
 
 
 def test_every_public_object_has_an_example():

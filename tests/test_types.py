@@ -17,7 +17,7 @@ from sklearn.utils._param_validation import StrOptions
 from sklearn_motionsync.body.formats import FORMATS
 
 from estimators import EVERY
-from test_docstrings import CALLABLES, assert_for_each, described
+from test_docstrings import CALLABLES, described, for_each
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -53,62 +53,52 @@ def admits_none(annotation):
 ESTIMATORS = {type(estimator).__name__: type(estimator) for estimator in EVERY}
 
 
-def test_every_public_signature_is_annotated():
-    def check(name, each):
-        hints = annotations(each)
-        known = inspect.signature(each).parameters.values()
-        assert {p.name for p in known} - {"self", "cls"} <= set(hints)
-        if not inspect.isclass(each):
-            assert "return" in hints
-        for parameter in known:
-            if parameter.default is None:
-                assert admits_none(hints[parameter.name]), parameter.name
-
-    assert_for_each(check, CALLABLES)
+@for_each(CALLABLES)
+def test_every_public_signature_is_annotated(name, each):
+    hints = annotations(each)
+    known = inspect.signature(each).parameters.values()
+    assert {p.name for p in known} - {"self", "cls"} <= set(hints)
+    if not inspect.isclass(each):
+        assert "return" in hints
+    for parameter in known:
+        if parameter.default is None:
+            assert admits_none(hints[parameter.name]), parameter.name
 
 
-def test_help_shows_the_names_of_types_and_not_what_they_stand_for():
-    def check(name, each):
-        members = vars(each).values() if inspect.isclass(each) else ()
-        for shown in [each, *filter(inspect.isfunction, members)]:
-            assert "inputs.types" not in str(inspect.signature(shown))
-
-    assert_for_each(check, CALLABLES)
+@for_each(CALLABLES)
+def test_help_shows_the_names_of_types_and_not_what_they_stand_for(name, each):
+    members = vars(each).values() if inspect.isclass(each) else ()
+    for shown in [each, *filter(inspect.isfunction, members)]:
+        assert "inputs.types" not in str(inspect.signature(shown))
 
 
-def test_help_speaks_of_trials():
-    def check(name, each):
-        for method in dir(each):
-            if not method.startswith(("_", "set_", "get_")):
-                doc = inspect.getdoc(getattr(each, method)) or ""
-                assert "(n_samples, n_features)" not in doc, method
-
-    assert_for_each(check, ESTIMATORS)
+@for_each(ESTIMATORS)
+def test_help_speaks_of_trials(name, each):
+    for method in dir(each):
+        if not method.startswith(("_", "set_", "get_")):
+            doc = inspect.getdoc(getattr(each, method)) or ""
+            assert "(n_samples, n_features)" not in doc, method
 
 
-def test_docstrings_name_the_strings_that_are_annotated():
-    def check(name, each):
-        hints = annotations(each)
-        for key, kind in described(inspect.getdoc(each)).items():
-            kind = re.sub(r",? *default=.*", "", kind)
-            if key in hints and str not in alternatives(hints[key]) and not kind.startswith("str "):
-                named = set(re.findall(r'"([\w-]+)"', kind))
-                assert named == strings(hints[key]), key
-
-    assert_for_each(check, CALLABLES)
+@for_each(CALLABLES)
+def test_docstrings_name_the_strings_that_are_annotated(name, each):
+    hints = annotations(each)
+    for key, kind in described(inspect.getdoc(each)).items():
+        kind = re.sub(r",? *default=.*", "", kind)
+        if key in hints and str not in alternatives(hints[key]) and not kind.startswith("str "):
+            named = set(re.findall(r'"([\w-]+)"', kind))
+            assert named == strings(hints[key]), key
 
 
-def test_annotations_are_the_constraints_of_estimators():
-    def check(name, each):
-        hints, constraints = annotations(each), each._parameter_constraints
-        assert set(hints) - {"return"} == set(constraints)
-        for key, allowed in constraints.items():
-            options = [each.options for each in allowed if isinstance(each, StrOptions)]
-            assert strings(hints[key]) == set().union(*options), key
-            takes_none = None in allowed or "random_state" in allowed
-            assert admits_none(hints[key]) == takes_none, key
-
-    assert_for_each(check, ESTIMATORS)
+@for_each(ESTIMATORS)
+def test_annotations_are_the_constraints_of_estimators(name, each):
+    hints, constraints = annotations(each), each._parameter_constraints
+    assert set(hints) - {"return"} == set(constraints)
+    for key, allowed in constraints.items():
+        options = [each.options for each in allowed if isinstance(each, StrOptions)]
+        assert strings(hints[key]) == set().union(*options), key
+        takes_none = None in allowed or "random_state" in allowed
+        assert admits_none(hints[key]) == takes_none, key
 
 
 def test_skeletons_of_formats_are_declared():
