@@ -236,16 +236,14 @@ def test_partial_fit_refuses_a_parameter_that_became_invalid():
 
 def test_partial_fit_takes_all_kinds_of_collections():
     X = curves(12, n_frames=10)
-    named = [to_frame(X[:5], columns=["x", "y"]), [pd.DataFrame(x, columns=["x", "y"]) for x in X]]
-    model = ActionModel().partial_fit(named[0]).partial_fit(named[1][5:])
+    tables = [pd.DataFrame(x, columns=["x", "y"]) for x in X]
+    model = ActionModel().partial_fit(to_frame(tables[:5])).partial_fit(tables[5:])
     assert_same_state(model, ActionModel().fit(X))
     assert model.feature_names_in_.tolist() == ["x", "y"]
     with pytest.raises(ValueError, match="feature names should match"):
-        model.partial_fit([x.rename(columns={"x": "z"}) for x in named[1]])
-    assert_same_state(
-        model.partial_fit([x[["y", "x"]] for x in named[1][:3]]),
-        ActionModel().partial_fit(X).partial_fit(X[:3]),
-    )
+        model.partial_fit([x.rename(columns={"x": "z"}) for x in tables])
+    model.partial_fit([x[["y", "x"]] for x in tables[:3]])
+    assert_same_state(model, ActionModel().fit([*X, *X[:3]]))
     rows = ActionModel().partial_fit(X[:1, :, 0]).partial_fit(X[1:, :, 0])
     assert_same_state(rows, ActionModel().fit(X[:, :, 0]))
     assert rows.sample(2, random_state=0).shape == (2, 10)

@@ -6,7 +6,8 @@ from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ActionDetector, ActionModel, ASpace, DenseSynchronizer, Match
 from sklearn_motionsync.model.similarity import PersonalReference
-from test_similarity import slow_ratio, slow_threshold
+from test_similarity import slow_ratio, slow_threshold, slow_weights
+from test_variation import slow_within
 
 P = 40
 
@@ -29,23 +30,9 @@ X, GROUPS = people(6, 5)
 NEW, PERSONS = people(4, 8, seed=1)
 
 
-def slow_weight(X, groups):
-    """A fifth of a typical distance of poses, among the trials of a person."""
-    apart, offset = [], []
-    for i, y in enumerate(X):
-        for z in (X[j] for j in range(i) if groups[j] == groups[i]):
-            energy = ((y - y.mean(0)) ** 2).sum() + ((z - z.mean(0)) ** 2).sum()
-            apart.append(((y - y.mean(0) - z + z.mean(0)) ** 2).sum() / energy)
-            offset.append(P * ((y.mean(0) - z.mean(0)) ** 2).sum() / energy)
-    return min(0.1, 0.2 * np.median(apart) / np.median(offset))
-
-
 def slow_factors(X, groups, m):
     """Between over between and within over m, of each feature; variances are means over frames."""
-    people = [X[groups == g] for g in sorted(set(groups))]
-    freedom = sum(len(x) - 1 for x in people)
-    within = sum(((x - x.mean(0)) ** 2).sum(0) for x in people) / freedom
-    within = np.mean((freedom * within + 5 * within.mean(0)) / (freedom + 5), axis=0)
+    within, people = slow_within(X, groups).mean(axis=0), [X[groups == g] for g in set(groups)]
     between = np.var([x.mean(0) for x in people], axis=0, ddof=1).mean(0)
     between = np.maximum(between - within * np.mean([1 / len(x) for x in people]), 0)
     return between / (between + within / m)
@@ -55,13 +42,13 @@ def slow_factors(X, groups, m):
 def test_dissimilarity_and_threshold_equal_slow_loops(m):
     model = ActionModel(coverage=0.9).fit(X, groups=GROUPS)
     own, new = NEW[PERSONS == 2][:m], NEW[PERSONS == 2][m:]
-    weight, factors = slow_weight(X, GROUPS), slow_factors(X, GROUPS, m)
+    weights, factors = slow_weights(X, GROUPS, within=True), slow_factors(X, GROUPS, m)
 
     def moved(some, mean):
         return some + (factors - 1) * (some.mean(axis=0) - mean)
 
     def nearest(y, some, mean):
-        return min(slow_ratio(y, z, (1, weight)) for z in moved(some, mean))
+        return min(slow_ratio(y, z, weights) for z in moved(some, mean))
 
     expected = [nearest(y, own, X.mean(axis=0)) for y in new]
     np.testing.assert_allclose(model.dissimilarity(new, reference=own), expected, rtol=1e-9)

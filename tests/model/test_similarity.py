@@ -50,24 +50,25 @@ def slow_velocity(x):
     return gaussian_filter1d(long, sigma, axis=0, order=1, mode="nearest")[n - 1 : 2 * n - 1]
 
 
-def slow_weights(X, groups):
-    """The factor of each feature, and the weight of mean poses, by loops."""
-    X = np.asarray(X)
-    moved = [x - x.mean(0) for x in X]
-    variances = [
-        np.mean([np.var([x[t, k] for x in moved]) for t in range(len(X[0]))])
-        for k in range(X.shape[2])
-    ]
-    scale = np.array([(max(variances) / max(v, max(variances) / 100)) ** 0.25 for v in variances])
-    apart, offset = [], []
+def slow_weights(X, groups, within=False):
+    """The factor of each feature, and the weight of mean poses, by loops.
+
+    Pairs are of different groups; within groups factors are 1, and mean poses weigh more.
+    """
+    X, scale, apart, offset = np.asarray(X), 1.0, [], []
+    if not within:
+        variances = np.var(X - X.mean(axis=1, keepdims=True), axis=0).mean(axis=0)
+        largest = variances.max()
+        scale = np.array([(largest / max(v, largest / 100)) ** 0.25 for v in variances])
     for i, y in enumerate(X):
         for j, z in enumerate(X[:i]):
-            if groups[i] != groups[j]:
+            if (groups[i] == groups[j]) == within:
                 a, b = (scale * (x - x.mean(0)) for x in (y, z))
                 energy = (a**2).sum() + (b**2).sum()
                 apart.append(((a - b) ** 2).sum() / energy)
                 offset.append(len(y) * ((scale * (y.mean(0) - z.mean(0))) ** 2).sum() / energy)
-    return scale, min(0.1, 0.05 * np.median(apart) / np.median(offset))
+    share = 0.2 if within else 0.05
+    return scale, min(0.1, share * np.median(apart) / np.median(offset))
 
 
 def slow_ratio(y, z, weights, mean=0):
