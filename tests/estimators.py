@@ -45,12 +45,8 @@ class AlternatingClassifier(ActionClassifier):
 
     def fit(self, X, y=None):
         if y is None:
-            n = (
-                X.index.get_level_values(0).nunique()
-                if isinstance(X, pd.DataFrame)
-                else len(list(X))
-            )
-            y = np.arange(n) % 2
+            trials = X.index.unique(0) if isinstance(X, pd.DataFrame) else list(X)
+            y = np.arange(len(trials)) % 2
         return super().fit(X, y)
 
 

@@ -96,7 +96,8 @@ def test_scikit_learn_checks(estimator, check):
         for estimator in ROW_ESTIMATORS
         for name in EXTRA_CHECKS
         if hasattr(estimator, "transform") or "transform" not in name
-    ],
+    ]
+    + [(estimator, "check_param_validation") for estimator in BODY],
     ids=by_name,
 )
 def test_scikit_learn_checks_that_are_not_in_the_automatic_list(estimator, name):
@@ -505,18 +506,3 @@ def test_body_estimators_follow_scikit_learn_on_rows(kind, reference, width, tri
     for bad in (X[:, :-1], X[0], np.where(np.eye(30, WIDTH), np.nan, X), X + 1j, X[:0]):
         with pytest.raises(ValueError):  # noqa: PT011 - scikit-learn's own messages
             clone(estimator).fit(bad)
-
-
-@pytest.mark.parametrize(
-    ("kind", "params"),
-    [
-        (DirectionCosines, {"reference": "sideways"}),
-        (DirectionCosines, {"skeleton": "acclaim"}),
-        (JointPositions, {"reference": "parent"}),
-        (JointPositions, {"skeleton": None}),
-    ],
-)
-def test_body_estimators_validate_parameters(kind, params, trials):
-    estimator = kind(Skeleton.paper()).set_params(**params)
-    with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
-        estimator.fit(trials)

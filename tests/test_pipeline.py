@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-from sklearn import config_context
+from sklearn import clone, config_context
 from sklearn.exceptions import NotFittedError
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 from sklearn.pipeline import Pipeline, make_pipeline
@@ -45,7 +45,6 @@ def test_people_are_accepted_and_another_action_scores_lower(bends, hdm05):
 
 def test_dense_beats_linear_on_held_out_actors(bends):
     """Synchronised trials of new people are more probable under the model."""
-
     given = {"groups": bends.actor, "cv": GroupKFold(4)}
     dense, linear = (
         cross_val_score(make_pipe(bends.skeleton, synchronizer), bends.data, **given).mean()
@@ -57,37 +56,24 @@ def test_dense_beats_linear_on_held_out_actors(bends):
 # -- pipelines within pipelines ---------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def few():
-    return make_bending(5, n_frames=40, random_state=2)
-
-
-def nestings(skeleton, synchronizer):
-    """The same pipeline, with all steps of one level and with pipelines and searches as steps."""
-    cosines, aspace = DirectionCosines(skeleton), ASpace(4)
-    steps = cosines, aspace, synchronizer, ActionModel()
-    search = GridSearchCV(synchronizer, {"n_frames": [40]}, cv=2, scoring=SpreadScorer())
-    return {
-        "flat": make_pipeline(*steps),
-        "deep": make_pipeline(make_pipeline(cosines, make_pipeline(aspace, *steps[2:]))),
-        "nothing between": make_pipeline(
-            cosines,
-            "passthrough",
-            Pipeline([("a", aspace), ("b", None), ("c", synchronizer)]),
-            steps[3],
-        ),
-        "search": make_pipeline(cosines, aspace, search, steps[3]),
-    }
-
-
-NESTINGS = list(nestings(None, DenseSynchronizer()))
+FEW = make_bending(5, n_frames=40, random_state=2)
+COSINES, ASPACE, MODEL = DirectionCosines(FEW.skeleton), ASpace(4), ActionModel()
+SYNC = DenseSynchronizer(40)
+SEARCH = GridSearchCV(SYNC, {"n_frames": [40]}, cv=2, scoring=SpreadScorer())
+BETWEEN = Pipeline([("a", ASPACE), ("b", None), ("c", SYNC)])
+# The same pipeline, with pipelines and searches as steps.
+NESTINGS = {
+    "deep": make_pipeline(make_pipeline(COSINES, make_pipeline(ASPACE, SYNC, MODEL))),
+    "nothing between": make_pipeline(COSINES, "passthrough", BETWEEN, MODEL),
+    "search": make_pipeline(COSINES, ASPACE, SEARCH, MODEL),
+}
 
 
 @pytest.fixture(scope="module")
-def flat(few):
+def flat():
     """The pipeline of one level, fitted, and what is said of it."""
-    pipe = nestings(few.skeleton, DenseSynchronizer(40))["flat"].fit(few.data)
-    return pipe, said_of(pipe, few.data)
+    pipe = clone(make_pipeline(COSINES, ASPACE, SYNC, MODEL)).fit(FEW.data)
+    return pipe, said_of(pipe, FEW.data)
 
 
 def said_of(pipe, X):
@@ -97,41 +83,47 @@ def said_of(pipe, X):
     return [scores, times, share, model.trials]
 
 
-@pytest.mark.parametrize("name", NESTINGS[1:])
-def test_synchronizer_is_found_in_nested_pipelines(name, few, flat):
-    pipe = nestings(few.skeleton, DenseSynchronizer(40))[name].fit(few.data)
-    for one, other in zip(flat[1], said_of(pipe, few.data), strict=True):
+@pytest.mark.parametrize("name", NESTINGS)
+def test_synchronizer_is_found_in_nested_pipelines(name, flat):
+    pipe = clone(NESTINGS[name]).fit(FEW.data)
+    for one, other in zip(flat[1], said_of(pipe, FEW.data), strict=True):
         np.testing.assert_array_equal(one, other)
     if name != "deep":
         return
-    figures = SynchronizationDisplay.from_estimator(pipe, few.data)
+    figures = SynchronizationDisplay.from_estimator(pipe, FEW.data)
     assert figures.ylabels == ["aspace0", "aspace1", "aspace2", "aspace3"]
-    assert TrellisDisplay.from_estimator(pipe, few.data).space.costs.shape[0] == 40
+    assert TrellisDisplay.from_estimator(pipe, FEW.data).space.costs.shape[0] == 40
     assert sorted(MetricDisplay.from_estimator(pipe).feature_names) == figures.ylabels
-    assert len(SkeletonDisplay.from_estimator(pipe, few.data).axes_) == 2
+    assert len(SkeletonDisplay.from_estimator(pipe, FEW.data).axes_) == 2
     assert len(SkeletonDisplay.from_model(pipe).axes_) == 4
 
 
-def test_absent_step_of_a_nested_pipeline_is_refused(few):
-    pipe = make_pipeline(make_pipeline(DirectionCosines(few.skeleton), ASpace(4)), ActionModel())
+def test_absent_step_of_a_nested_pipeline_is_refused():
+    pipe = make_pipeline(make_pipeline(COSINES, ASPACE), MODEL)
     message = r"no synchronizer in Pipeline; its steps are \['DirectionCosines', 'ASpace', 'Action"
     with pytest.raises(ValueError, match=message):
-        SpreadScorer()(pipe, few.data)
+        SpreadScorer()(pipe, FEW.data)
     with pytest.raises(NotFittedError):
-        SpreadScorer()(nestings(few.skeleton, DenseSynchronizer(40))["deep"], few.data)
+        SpreadScorer()(NESTINGS["deep"], FEW.data)
 
 
 # -- key-frames along with trials -------------------------------------------------
 
 
-def make_marked(bunch, *, nested):
-    """A pipeline with key-frames, fitted."""
+@pytest.fixture(scope="module")
+def marked():
+    """Pipelines fitted with key-frames: of one level, and nested."""
     sync = LinearSynchronizer(40)
     with config_context(enable_metadata_routing=True):
         sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
-        steps = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(4), sync)
-        pipe = make_pipeline(*([steps] if nested else steps), ActionModel())
-        return pipe.fit(bunch.data, keyframes=bunch.keyframes)
+        steps = make_pipeline(COSINES, ASPACE, sync)
+        pipes = [clone(make_pipeline(*some, MODEL)) for some in (steps, [steps])]
+        return [pipe.fit(FEW.data, keyframes=FEW.keyframes) for pipe in pipes]
+
+
+@pytest.fixture(scope="module")
+def points():
+    return clone(make_pipeline(COSINES, ASPACE)).fit_transform(FEW.data)
 
 
 # What takes a pipeline and trials, with whatever goes along with these.
@@ -141,23 +133,16 @@ OF_PIPELINES = {
 }
 
 
-@pytest.fixture(scope="module")
-def marked(few):
-    """Of one level, and nested."""
-    return [make_marked(few, nested=nested) for nested in (False, True)]
-
-
 @pytest.mark.parametrize(("nested", "routing"), [(False, True), (True, False)])
-def test_displays_and_scorers_take_key_frames(nested, routing, few, marked):
-    pipe, K = marked[nested], list(few.keyframes)
-    points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
+def test_displays_and_scorers_take_key_frames(nested, routing, marked, points):
+    pipe, K = marked[nested], list(FEW.keyframes)
     sync = LinearSynchronizer(40).fit(points, keyframes=K)
     expected = sync.match(points, keyframes=K)
     with config_context(enable_metadata_routing=routing):
-        match = Match.from_estimator(pipe, few.data, keyframes=K)
-        display = SynchronizationDisplay.from_estimator(pipe, few.data, keyframes=K, features=0)
-        model = ActionModelDisplay.from_estimator(pipe, few.data, keyframes=K, features=0)
-        people = SkeletonDisplay.from_estimator(pipe, few.data, keyframes=K, azimuth=0, at=0.5)
+        match = Match.from_estimator(pipe, FEW.data, keyframes=K)
+        display = SynchronizationDisplay.from_estimator(pipe, FEW.data, keyframes=K, features=0)
+        model = ActionModelDisplay.from_estimator(pipe, FEW.data, keyframes=K, features=0)
+        people = SkeletonDisplay.from_estimator(pipe, FEW.data, keyframes=K, azimuth=0, at=0.5)
     np.testing.assert_array_equal(match.times, expected.times)
     np.testing.assert_array_equal(display.match.times, expected.times)
     after = sync.transform(points, keyframes=K)[:, :, :1]
@@ -167,30 +152,29 @@ def test_displays_and_scorers_take_key_frames(nested, routing, few, marked):
 
 
 @pytest.mark.parametrize("name", list(OF_PIPELINES)[:-1])
-def test_every_caller_says_how_to_give_key_frames(name, few, marked):
+def test_every_caller_says_how_to_give_key_frames(name, marked):
     for pipe in marked:
         with pytest.raises(ValueError, match="fitted with key-frames") as error:
-            OF_PIPELINES[name](pipe, few.data)
+            OF_PIPELINES[name](pipe, FEW.data)
         assert f"{name}.from_estimator(estimator, X, keyframes=[...])" in str(error.value)
 
 
 @pytest.mark.parametrize("name", OF_PIPELINES)
-def test_unknown_parameter_is_refused(name, few, flat):
-    for given in ({"keyframes": few.keyframes}, {"feature": "aspace0"}):
+def test_unknown_parameter_is_refused(name, flat):
+    for given in ({"keyframes": FEW.keyframes}, {"feature": "aspace0"}):
         message = f"{name}.* got '{next(iter(given))}', .*DenseSynchronizer"
         with pytest.raises(TypeError, match=message):
-            OF_PIPELINES[name](flat[0], few.data, **given)
+            OF_PIPELINES[name](flat[0], FEW.data, **given)
 
 
-def test_model_without_a_synchronizer_refuses_key_frames(few, marked):
+def test_model_without_a_synchronizer_refuses_key_frames(marked):
     with pytest.raises(TypeError, match="keyframes along with trials X only"):
-        ActionModelDisplay.from_estimator(marked[0], keyframes=few.keyframes)
+        ActionModelDisplay.from_estimator(marked[0], keyframes=FEW.keyframes)
 
 
-def test_key_frames_reach_a_step_before_the_synchronizer(few):
+def test_key_frames_reach_a_step_before_the_synchronizer(points):
     """Dense matching of what coincides in its key-frames already."""
-    K = few.keyframes
-    points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
+    K = FEW.keyframes
     steps = LinearSynchronizer(40), DenseSynchronizer(30)
     pipe = make_pipeline(*steps).fit(points, linearsynchronizer__keyframes=K)
     marked = steps[0].transform(points, keyframes=K)
