@@ -115,10 +115,6 @@ def _is_own(node):
     return isinstance(node, ast.Call) and getattr(node.func, "id", "") == "super"
 
 
-def _is_private(name):
-    return name.startswith("_") and not name.startswith("__")
-
-
 # Where a private name may be taken: behind a dot, in an import, also of several lines, or by text.
 MAY_BE_PRIVATE = re.compile(
     r"\._[A-Za-z]|\b(from|import)\b.*[ .]_[A-Za-z]|^\s+_\w+( as \w+)?,?$|\bsetattr\b", re.MULTILINE
@@ -140,7 +136,7 @@ def private_accesses(path):
             strings = [a.value for a in node.args if isinstance(a, ast.Constant)]
             taken = [part for s in strings if isinstance(s, str) for part in s.split(".")]
         for name in taken:
-            if _is_private(name) and name not in ALLOWED:
+            if name.startswith("_") and name[:2] != "__" and name not in ALLOWED:
                 yield f"{path.relative_to(ROOT)}:{node.lineno}: {name}"
 
 
