@@ -118,6 +118,16 @@ def test_samples_near_an_outlier_are_as_far_away_as_it_is():
     np.testing.assert_allclose(np.std(near), np.sqrt(0.16) * X.std(), rtol=0.3)
 
 
+def test_samples_of_two_styles_avoid_their_mean():
+    X = two_styles()[:, -1]
+    drawn = poses_of(X)
+    share = (np.abs(drawn[:, 0] - X[:, 0].mean()) < 0.2 * X[:, 0].std()).mean()
+    assert share < 0.05  # 16 % of a normal distribution
+    # And a person is of one style in all features.
+    signs = np.sign(drawn - X.mean(axis=0))
+    assert (np.abs(signs.sum(axis=1)) == 3).mean() > 0.95
+
+
 # -- whole trials -----------------------------------------------------------------
 
 

@@ -134,8 +134,10 @@ def test_band_of_one_number_is_the_t_interval(n):
 def test_band_is_proportional_to_the_jackknife_error(sizes):
     """By the mean without a group, drawn to its mean over the frames; times one factor."""
     X, groups = people(sizes)
+    # Far from the origin, which has no part in it.
+    X += 100
     gappy, factors = X.copy(), []
-    gappy[: sizes[0], 3:5, 1] = np.nan
+    gappy[: sizes[0], 4, 1] = np.nan
     for some in (X, gappy):
         moved = [np.nanmean(some[groups != g], axis=0) for g in range(len(sizes))]
         moved -= np.nanmean(some, axis=0)
@@ -147,7 +149,8 @@ def test_band_is_proportional_to_the_jackknife_error(sizes):
         np.testing.assert_allclose(factors[-1], factors[-1][0, 0])
     pointwise = student(len(sizes) - 1).ppf(0.975)
     assert 0.8 * pointwise < factors[0][0, 0] < 5 * pointwise
-    np.testing.assert_allclose(*factors, rtol=0.15)
+    # Where a group is not seen, the largest |t| is larger.
+    assert 1 < factors[1][0, 0] / factors[0][0, 0] < 1.1
 
 
 def test_a_band_of_the_mean_repeats_with_its_random_state():
