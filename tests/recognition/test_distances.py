@@ -167,7 +167,15 @@ def test_verbose_prints_progress(capsys):
     ]
 
 
-# -- still trials ------------------------------------------------------
+# -- units and still trials ------------------------------------------------------
+
+
+@pytest.mark.parametrize("cost", COSTS)
+def test_normalized_distances_do_not_depend_on_units(cost):
+    X = walks(7)
+    D = synchronization_distances(X, cost=cost)
+    each = [x * 2.0 ** (4 * i) for i, x in enumerate(X)]
+    np.testing.assert_array_equal(synchronization_distances(each, cost=cost), D)
 
 
 @pytest.mark.parametrize("cost", ["velocity", "elastic"])
