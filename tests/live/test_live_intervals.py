@@ -113,17 +113,14 @@ def test_phases_and_intervals_of_real_people_held_out(hdm05):
         wrong.append(mean_width(others))
         pairs = zip(tracks, truths, strict=True)
         errors += [np.abs(x.phase - truth)[len(truth) // 5 :] for x, truth in pairs]
-        confidence.append(
-            [
-                np.median([x.confidence[len(x.phase) // 2 :].mean() for x in some])
-                for some in (tracks, others)
-            ]
-        )
+        for some in (tracks, others):
+            late = [x.confidence[len(x.phase) // 2 :].mean() for x in some]
+            confidence.append(np.median(late))
     assert 0.82 <= np.mean(shares) <= 0.97
     assert np.mean(right) < 15
     assert np.mean(wrong) > 1.3 * np.mean(right)
     assert np.median(np.concatenate(errors)) < 3.5
-    assert all(other < own / 2 for own, other in confidence)
+    assert (np.array(confidence[1::2]) < np.array(confidence[::2]) / 2).all()
 
 
 # -- when they widen ----------------------------------------------------------------------
@@ -137,10 +134,6 @@ def test_intervals_widen_while_nothing_is_seen(fitted, clips):
     assert last >= 3 * before
     assert (np.diff(width(found)[hidden]) > -2).all()
     assert after == pytest.approx(width(seen)[-1], abs=2)
-    # Time without frames is like frames of NaN.
-    kept = np.flatnonzero(~in_gap(x)[:, 0])
-    (late,) = fitted.track([x[kept]], [kept])
-    np.testing.assert_allclose(width(late)[-20:], width(found)[-20:], atol=2)
     # If nothing is seen from the start on, it widens as well.
     (blind,) = fitted.track([np.full_like(x, np.nan)])
     check_bounds(blind)
@@ -184,20 +177,17 @@ def test_bounds_are_quantiles_about_the_phase():
     assert np.isfinite(huge).all()
 
 
-def test_intervals_do_not_depend_on_the_unit():
-    rng = np.random.default_rng(1)
-    t = np.linspace(0, 1, 50)
+@pytest.mark.parametrize("n", [1, 5])
+def test_intervals_do_not_depend_on_the_unit(n):
+    rng, t = np.random.default_rng(1), np.linspace(0, 1, 50)
     X = [np.column_stack([np.sin(3 * t**b), np.cos(5 * t**b)]) for b in rng.uniform(0.8, 1.2, 6)]
-    for n in (1, 5):
-        one, other = (
-            OnlineSynchronizer(LinearSynchronizer())
-            .fit([unit * x for x in X[:n]])
-            .track([unit * X[5]])[0]
-            for unit in (1, 2.0**-20)
-        )
-        check_bounds(one, 49)
-        np.testing.assert_allclose(other.lower, one.lower, atol=1)
-        np.testing.assert_allclose(other.upper, one.upper, atol=1)
+    bounds = []
+    for unit in (1, 2.0**-20):
+        live = OnlineSynchronizer(LinearSynchronizer()).fit([unit * x for x in X[:n]])
+        (found,) = live.track([unit * X[5]])
+        check_bounds(found, 49)
+        bounds.append([found.lower, found.upper])
+    np.testing.assert_allclose(*bounds, atol=1)
 
 
 def test_a_single_training_trial_has_wider_intervals(fitted, clips, truths, as_made):
@@ -205,13 +195,3 @@ def test_a_single_training_trial_has_wider_intervals(fitted, clips, truths, as_m
     alone = OnlineSynchronizer(DenseSynchronizer(P)).fit(x).track(clips[1::2])
     assert mean_width(alone) > 1.5 * mean_width(as_made)
     assert held(alone, truths[1::2]) > 0.85
-
-
-def test_what_costs_nothing_has_intervals_of_the_least_width():
-    x = COSINES.transform([BUNCH.data[0]])[0]
-    (found,) = OnlineSynchronizer(LinearSynchronizer()).fit([x] * 3).track([x])
-    check_bounds(found, len(x) - 1)
-    assert np.median(width(found)) <= 2.1
-    constant = OnlineSynchronizer(LinearSynchronizer()).fit([np.ones((40, 3))] * 2)
-    (found,) = constant.track([np.ones((40, 3))])
-    check_bounds(found, 39)

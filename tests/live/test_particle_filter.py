@@ -14,7 +14,6 @@ from sklearn_motionsync.live.members import (
     RunningTake,
     pool,
     systematic_resampling,
-    weighted_median,
 )
 from sklearn_motionsync.live.state_space import (
     CausalSlopes,
@@ -26,14 +25,15 @@ from sklearn_motionsync.live.state_space import (
 from sklearn_motionsync.live.tracker import Observer
 
 
-def noise_of(deviation, n=3):
-    return deviation**2 * np.eye(n)
+RNG, T = np.random.default_rng(0), np.linspace(0, 1, 25)[:, np.newaxis]
+X = np.stack([np.sin(4 * T + RNG.uniform(0, 1, 3)) * RNG.uniform(0.7, 1.3, 3) for _ in range(6)])
+NOISE = 0.01 * np.eye(3)
 
 
-def make_training(n, seed=0):
-    rng = np.random.default_rng(seed)
-    t = np.linspace(0, 1, 25)[:, np.newaxis]
-    return [np.sin(4 * t + rng.uniform(0, 1, 3)) * rng.uniform(0.7, 1.3, 3) for _ in range(n)]
+def of_uneven_rates(duration):
+    """What is learnt of the trials, whose rates vary, by 60 particles."""
+    rates = np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25)))
+    return TrackerModel.learn(X, rates, np.arange(6), Clock(24.0, duration), NOISE, 60)
 
 
 @pytest.fixture(autouse=True)
@@ -45,15 +45,15 @@ def phases_alone(monkeypatch):
 @pytest.fixture(scope="module")
 def fitted():
     """With one particle, whose phases are those of the track."""
-    return MotionTracker(LinearSynchronizer(), 1, noise=0.1, random_state=1).fit(make_training(6))
+    return MotionTracker(LinearSynchronizer(), 1, noise=0.1, random_state=1).fit(X)
 
 
 @pytest.fixture(scope="module")
 def model(fitted):
     """What it has learnt, of one particle."""
-    warped, clock = np.stack(fitted.synchronizer_.transform(make_training(6))), Clock(24.0, 24.0)
+    warped, clock = fitted.synchronizer_.transform(X), Clock(24.0, 24.0)
     assert (fitted.n_frames_, fitted.duration_) == (25, 24)
-    return TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, noise_of(0.1), 1)
+    return TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, NOISE, 1)
 
 
 def sample_body(tracker, times, rng):
@@ -122,38 +122,33 @@ def seen_through(values, projection):
     return with_gaps(values @ matrix.T + offset)
 
 
+@pytest.mark.parametrize("member", ["phases", "pooled"])
 @pytest.mark.parametrize("projection", [None, PROJECTION])
 @pytest.mark.parametrize("method", ["track", "smooth"])
-def test_poses_equal_gaussian_process_posterior(fitted, seen, method, projection):
+def test_poses_equal_gaussian_process_posterior(
+    fitted, model, seen, method, projection, member, monkeypatch
+):
+    """That of the pooled member about the mean of all frames, whatever the phase."""
+    body, level = fitted, fitted.mean_.mean(axis=0)
+    if member == "pooled":
+        monkeypatch.setattr(members, "pool", lambda estimates, evidence, model: estimates[1])
+        warped = fitted.synchronizer_.transform(X)
+        off = (warped - level).reshape(-1, 3)
+        pooled, moments = model.pooled, off.T @ off / len(off)
+        expected = 0.85 * moments + 0.15 * np.diag(np.diag(moments))
+        np.testing.assert_allclose(pooled.covariance, expected, rtol=1e-9)
+        length_scale = np.sqrt(3) / pooled.decay
+        body = SimpleNamespace(
+            length_scale_=length_scale, covariance_=pooled.covariance, noise=fitted.noise
+        )
     values, times = seen_through(seen[0], projection), seen[1]
     track = getattr(fitted, method)(values, times=times, projection=projection)
     assert track.phases[-1] < fitted.n_frames_ - 1
     assert not track.lost.any()
     mean = mean_at(fitted, track.phases)
-    assert_posterior(fitted, track, method, mean, values, times, projection)
-
-
-@pytest.mark.parametrize("projection", [None, PROJECTION])
-@pytest.mark.parametrize("method", ["track", "smooth"])
-def test_pooled_member_equals_gaussian_process_posterior(
-    fitted, model, seen, method, projection, monkeypatch
-):
-    """About the mean of all frames, whatever the phase."""
-    monkeypatch.setattr(members, "pool", lambda estimates, evidence, model: estimates[1])
-    warped = fitted.synchronizer_.transform(make_training(6))
-    off = (warped - warped.mean(axis=(0, 1))).reshape(-1, 3)
-    pooled, moments = model.pooled, off.T @ off / len(off)
-    expected = 0.85 * moments + 0.15 * np.diag(np.diag(moments))
-    np.testing.assert_allclose(pooled.covariance, expected, rtol=1e-9)
-    level = SimpleNamespace(
-        length_scale_=np.sqrt(3) / pooled.decay,
-        covariance_=pooled.covariance,
-        noise=fitted.noise,
-    )
-    values, times = seen_through(seen[0], projection), seen[1]
-    track = getattr(fitted, method)(values, times=times, projection=projection)
-    mean = np.tile(fitted.mean_.mean(axis=0), (len(times), 1))
-    assert_posterior(level, track, method, mean, values, times, projection)
+    if member == "pooled":
+        mean = np.tile(level, (len(times), 1))
+    assert_posterior(body, track, method, mean, values, times, projection)
 
 
 @pytest.mark.parametrize("method", ["track", "smooth"])
@@ -193,24 +188,13 @@ def test_restarts_leave_the_body_where_it_is(method):
     assert_posterior(fitted, track, method, mean, values, times, frames=frames)
 
 
-def test_smooth_of_several_blocks_equals_posterior(fitted):
-    rng = np.random.default_rng(5)
-    times = np.cumsum(rng.uniform(0.03, 0.07, 230))
-    blind = fitted.track(np.full((230, 3), np.nan), times=times)
-    values = with_gaps(blind.poses + 0.1 * rng.standard_normal((230, 3)))
-    values[95:105] = np.nan
-    track = fitted.smooth(values, times=times)
-    mean = mean_at(fitted, track.phases)
-    assert_posterior(fitted, track, "smooth", mean, values, times, frames=(0, 99, 100, 199, 229))
-
-
 # -- mixtures of particles, and limits -----------------------------------------------------
 
 
 @pytest.mark.parametrize("method", ["track", "smooth"])
 def test_first_frame_unseen_is_the_mixture_of_first_phases(method):
     """Of 20 particles two begin elsewhere, evenly spread; each is on a path of the smoother."""
-    tracker = MotionTracker(LinearSynchronizer(), 20, noise=0.1).fit(make_training(6))
+    tracker = MotionTracker(LinearSynchronizer(), 20, noise=0.1).fit(X)
     last, mean = tracker.n_frames_ - 1, tracker.mean_
     track = getattr(tracker, method)(np.full((1, 3), np.nan))
     phases = np.append(np.zeros(18), [9 / 19 * last, last])
@@ -225,10 +209,10 @@ def test_first_frame_unseen_is_the_mixture_of_first_phases(method):
 @pytest.mark.parametrize("duration", [24.0, 100.0])
 def test_limits_of_the_nis_equal_their_definition(outlier, duration):
     """By regression lines and a Kalman filter, take by take."""
-    warped, noise, width = np.stack(make_training(6)), 0.05, 3
+    warped, noise, width = X.copy(), 0.05, 3
     if outlier:
         warped[2, 10:16] += [5, 0, -5]
-    clock, step, R = Clock(24.0, duration), duration / 24, noise_of(noise)
+    clock, step, R = Clock(24.0, duration), duration / 24, noise**2 * np.eye(3)
     model = TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, R, 50)
     deviations = (warped - warped.mean(axis=0)) * 6 / 5
     window, times = max(0.03 * duration, 1.0), step * np.arange(25)
@@ -274,15 +258,9 @@ def test_limits_of_the_nis_equal_their_definition(outlier, duration):
 
 def test_estimates_are_those_of_the_weighted_particles():
     """Law of total variance, weighted medians, effective size; and of rates at the end, 0."""
-    clock, rates = (
-        Clock(24.0, 24.0),
-        np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25))),
-    )
-    given = np.stack(make_training(6)), rates, np.arange(6), clock
-    model = TrackerModel.learn(*given, noise_of(0.1), 60)
-    running, mean = RunningTake(model, 3, 0.0, 3), given[0].mean(axis=0)
+    running, mean = RunningTake(of_uneven_rates(24.0), 3, 0.0, 3), X.mean(axis=0)
     for p in range(25):
-        track = running.step(given[0][2, p], float(p), Observer(np.eye(3), noise_of(0.1)))
+        track = running.step(X[2, p], float(p), Observer(np.eye(3), NOISE))
         particles, deviations = running.phases.particles, running.phases.deviations
         weights = np.exp(particles.log_weights)
         assert weights.sum() == pytest.approx(1)
@@ -321,21 +299,21 @@ def test_pool_multiplies_densities_by_their_weights(model):
 def test_evidence_is_the_average_nis_of_innovations(model, seen):
     """Of both members, by their distribution before each observation."""
     values, times = seen
-    rows, noise = np.eye(3), noise_of(0.1)
+    rows = np.eye(3)
     running = RunningTake(model, 1, times[0], 3)
     evidence, before = np.ones(2), times[0]
     for y, time in zip(values, times, strict=True):
         running.phases.rng, again = np.random.default_rng(0), np.random.default_rng(0)
         other = deepcopy(running)
         other.phases.rng = again
-        other.update(np.full(3, np.nan), time, Observer(rows, noise))
+        other.update(np.full(3, np.nan), time, Observer(rows, NOISE))
         left = np.exp(-(time - before) / model.clock.memory)
         for k, member in enumerate((other.phases, other.pooled)):
             mean, covariance = member.estimate
             off = y - mean
-            nis = off @ np.linalg.solve(covariance + noise, off) / 3
+            nis = off @ np.linalg.solve(covariance + NOISE, off) / 3
             evidence[k] = left * evidence[k] + (1 - left) * nis
-        running.update(y, time, Observer(rows, noise))
+        running.update(y, time, Observer(rows, NOISE))
         np.testing.assert_allclose(running.evidence, evidence, rtol=1e-6)
         before = time
     assert (evidence != 1).all()
@@ -344,18 +322,13 @@ def test_evidence_is_the_average_nis_of_innovations(model, seen):
 @pytest.mark.parametrize("rows", [[0, 2], [0, 1, 2], [0, 1, 2, 0, 1]])
 def test_weights_and_nis_equal_their_definitions(rows):
     """By the slopes of the particles; a NIS of few numbers varies as that of all features."""
-    clock, rates = (
-        Clock(24.0, 48.0),
-        np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25))),
-    )
-    given = np.stack(make_training(6)), rates, np.arange(6), clock
-    model, matrix = TrackerModel.learn(*given, noise_of(0.1), 60), np.eye(3)[rows]
+    model, matrix = of_uneven_rates(48.0), np.eye(3)[rows]
     running, all_seen = ParticleFilter(model, 3, 0.0, len(rows)), np.ones(len(rows), dtype=bool)
     nis, n, share = np.ones(2), len(rows), min(np.sqrt(len(rows) / 3), 1)
     noise, frames = 0.01 * np.eye(n), np.arange(25)
     for p in range(25):
         before, dt = running.particles, 2.0 if p else 0.0
-        y = matrix @ given[0][2, p] + 0.02 * np.cos(np.arange(n) + p)
+        y = matrix @ X[2, p] + 0.02 * np.cos(np.arange(n) + p)
         running.update(y, 2.0 * p, Observer(matrix, noise))
         now = running.particles
         if p:
@@ -419,12 +392,6 @@ def test_systematic_resampling_rounds_shares_of_weights(start):
     counts = np.bincount(systematic_resampling(weights, start, 10), minlength=6)
     assert counts.sum() == 10
     assert (np.abs(counts - 10 * weights) < 1).all()
-
-
-def test_weighted_median_has_half_of_the_weight():
-    values = np.array([5.0, 1.0, 3.0])
-    for weights, median in (([0.2, 0.5, 0.3], 1), ([0.2, 0.4, 0.4], 3), ([0.6, 0.2, 0.2], 5)):
-        assert weighted_median(values, np.array(weights)) == median
 
 
 def test_moves_keep_spread_and_memory_of_log_rates():

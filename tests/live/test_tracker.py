@@ -82,12 +82,15 @@ def test_step_equals_track(tracker, running, take):
 
 
 def test_equal_random_states_give_equal_results(tracker, take):
+    """Of a take by itself, beside others, as a table and as a list."""
     twin = clone(tracker).fit(TRAINING)
     for method in ("track", "smooth"):
         alone = getattr(tracker, method)(take)
         assert_same(getattr(twin, method)([take[:9], take])[1], alone)
         assert isinstance(alone, Track)
         assert repr(alone) == "Track(60 frames of 3 features, 0 of them lost)"
+    for other in (pd.DataFrame(take), take.tolist()):
+        assert_same(tracker.track(other), tracker.track(take))
 
 
 def test_seconds_are_frames_over_the_frame_rate(tracker, take):
@@ -99,24 +102,12 @@ def test_seconds_are_frames_over_the_frame_rate(tracker, take):
         np.testing.assert_allclose(a, b, atol=1e-6)
 
 
-def test_a_take_may_be_a_table_or_a_list(tracker, take):
-    expected = tracker.track(take)
-    assert_same(tracker.track(pd.DataFrame(take)), expected)
-    assert_same(tracker.track(take.tolist()), expected)
-
-
 def test_rows_are_takes_after_a_fit_on_rows(tracker):
     rows = np.stack([movement(size)[:, 0] for size in (0.9, 1.0, 1.1, 1.2)])
     fitted = clone(tracker).fit(rows)
     tracks = fitted.track(rows[:2])
     assert [t.poses.shape for t in tracks] == [(60, 1)] * 2
     assert_same(fitted.step(rows[0, 0]), (part[0] for part in tracks[0]))
-
-
-def test_single_precision_stays(tracker, take):
-    single = clone(tracker).fit([movement(s).astype(np.float32) for s in (0.9, 1.0, 1.1)])
-    track = single.track(take.astype(np.float32))
-    assert track.poses.dtype == track.covariances.dtype == single.mean_.dtype == np.float32
 
 
 def test_projection_of_poses(tracker, running):
@@ -165,12 +156,14 @@ def test_constant_features_have_the_least_variance():
 
 
 def test_two_trials_are_enough():
-    """Of two the deviations are their differences."""
-    X = [movement(1.0), movement(1.2)]
+    """Of two the deviations are their differences; single precision stays."""
+    X = [movement(size).astype(np.float32) for size in (1.0, 1.2)]
     fitted = MotionTracker(LinearSynchronizer(), 50).fit(X)
     squares = np.square(X[1] - X[0]).mean(axis=0)
-    np.testing.assert_allclose(np.diag(fitted.covariance_), squares)
-    assert np.isfinite(fitted.track(movement(1.05)).poses).all()
+    np.testing.assert_allclose(np.diag(fitted.covariance_), squares, rtol=1e-5)
+    track = fitted.track(movement(1.05).astype(np.float32))
+    assert track.poses.dtype == track.covariances.dtype == fitted.mean_.dtype == np.float32
+    assert np.isfinite(track.poses).all()
 
 
 def test_groups_of_similar_trials_widen_deviations(tracker):
@@ -183,35 +176,18 @@ def test_groups_of_similar_trials_widen_deviations(tracker):
 # -- missing and improbable observations --------------------------------------------------
 
 
-def paced(paces):
-    """A movement that goes on by these shares of the mean pace, frame by frame, and its phases."""
-    phases = np.minimum(np.cumsum(paces), 59.0)
-    return np.column_stack([np.interp(phases, np.arange(60), m) for m in movement(1.05).T]), phases
-
-
-@pytest.fixture(scope="module")
-def of_any_pace():
-    sizes, frames = (0.9, 1.0, 1.1, 1.2), (40, 52, 65, 83)
-    X = [movement(size, n) for size, n in zip(sizes, frames, strict=True)]
-    return MotionTracker(LinearSynchronizer(60), 400, noise=0.02).fit(X)
-
-
-def test_phase_follows_another_pace_with_a_feature_never_seen(of_any_pace):
-    take, phases = paced(np.full(38, 59 / 37))
-    take[:, 1] = np.nan
-    for track in (of_any_pace.track(take), of_any_pace.smooth(take)):
-        assert np.abs(track.phases - phases)[8:].mean() < 4
-        assert np.median(track.rates[10:30]) == pytest.approx(59 / 37, rel=0.2)
-
-
-def test_smoothed_phases_of_hidden_frames_are_those_that_lead_to_the_later_ones(of_any_pace):
+def test_smoothed_phases_of_hidden_frames_are_those_that_lead_to_the_later_ones():
     """Nothing is seen in the beginning of a fast take: the filter is late, the smoother is not."""
-    take, phases = paced(np.full(40, 59 / 39))
+    lengths = {0.9: 40, 1.0: 52, 1.1: 65, 1.2: 83}
+    X = [movement(size, n) for size, n in lengths.items()]
+    tracker = MotionTracker(LinearSynchronizer(60), 400, noise=0.02).fit(X)
+    take, phases = movement(1.05, 40), np.arange(40) * 59 / 39
     take[1:15] = np.nan
-    track, smooth = of_any_pace.track(take), of_any_pace.smooth(take)
+    track, smooth = tracker.track(take), tracker.smooth(take)
     assert (phases - track.phases)[14] > 5
     assert np.abs(smooth.phases - phases)[:30].max() < 3
     assert (np.diff(smooth.phases)[:30] > 0).all()
+    assert np.median(track.rates[20:35]) == pytest.approx(59 / 39, rel=0.2)
 
 
 @pytest.mark.parametrize("size", [50.0, 1e30, 1.7e308])
@@ -317,6 +293,15 @@ def test_refused_observation_changes_nothing(running, take, frame, time, message
     assert pickle.dumps(vars(running)) == before
 
 
+def test_refused_estimators(tracker):
+    unfitted = MotionTracker()
+    for call in (unfitted.reset, lambda: unfitted.step([0.0]), lambda: unfitted.track([[0.0]])):
+        with pytest.raises(NotFittedError):
+            call()
+    with pytest.raises(ValueError, match=r"'noise' parameter .* \(0.0, 1000000000.0\]"):
+        clone(tracker).set_params(noise=1e200).fit(TRAINING)
+
+
 def test_feature_names_are_checked():
     frames = [pd.DataFrame(movement(s), columns=list("xyz")) for s in (0.9, 1.0, 1.1)]
     named = MotionTracker(LinearSynchronizer(), 20).fit(frames)
@@ -327,30 +312,23 @@ def test_feature_names_are_checked():
         named.step(frames[0][list("zyx")].iloc[0])
 
 
-def test_methods_before_fit_are_refused():
-    unfitted = MotionTracker()
-    for call in (unfitted.reset, lambda: unfitted.step([0.0]), lambda: unfitted.track([[0.0]])):
-        with pytest.raises(NotFittedError):
-            call()
-
-
-def test_fit_refuses_noise_beyond_all_data(tracker):
-    with pytest.raises(ValueError, match=r"'noise' parameter .* \(0.0, 1000000000.0\]"):
-        clone(tracker).set_params(noise=1e200).fit(TRAINING)
-
-
 # -- people -------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
-def of_bends(bends):
-    """Bends at 30 Hz: a tracker of three actors, and the poses of the fourth."""
-    X = [x[::4] for x in DirectionCosines(bends.skeleton).fit_transform(bends.data)]
+def people(bends):
+    """Bends at 30 Hz of three actors, the groups of these, and bends of the fourth."""
     held = bends.actor == bends.actor[-1]
-    training = [x for x, of in zip(X, held, strict=True) if not of]
-    sync = DenseSynchronizer(metric=None, refine=False)
-    tracker = MotionTracker(sync, 100).fit(training, groups=bends.actor[~held])
-    return tracker, [X[i] for i in np.flatnonzero(held)]
+    known, new = ([bends.data[i][::4] for i in np.flatnonzero(h)] for h in (~held, held))
+    return known, bends.actor[~held], new, DirectionCosines(bends.skeleton).fit(known)
+
+
+@pytest.fixture(scope="module")
+def of_bends(people):
+    """A tracker of the three actors, and the poses of the fourth."""
+    known, groups, new, cosines = people
+    tracker = MotionTracker(DenseSynchronizer(metric=None, refine=False), 100)
+    return tracker.fit(cosines.transform(known), groups=groups), cosines.transform(new)
 
 
 def test_errors_of_a_new_person_are_smaller_than_of_the_mean(of_bends):
@@ -378,56 +356,48 @@ def test_errors_of_a_new_person_are_smaller_than_of_the_mean(of_bends):
     assert smoothed < 0.9 * filtered
 
 
-def test_moved_joints_of_a_new_person(bends):
+def test_moved_joints_of_a_new_person(people):
     """By 1 and 5 cm: not lost, and nearer to the truth than with equal noise in every cosine."""
-    X = [x[::4] for x in bends.data]
-    held = bends.actor == bends.actor[-1]
-    training = [x for x, of in zip(X, held, strict=True) if not of]
-    cosines = DirectionCosines(bends.skeleton).fit(training)
-    poses, sync = cosines.transform(training), DenseSynchronizer(metric=None, refine=False)
-    rng, new = np.random.default_rng(0), [X[i] for i in np.flatnonzero(held)[:2]]
-    errors = []
+    known, groups, new, cosines = people
+    poses, new, rng, errors = cosines.transform(known), new[:2], np.random.default_rng(0), []
     for sd, equal in ((0.01, False), (0.05, False), (0.05, True)):
         if not equal:
             seen = cosines.transform([x + sd * rng.standard_normal(x.shape) for x in new])
-        tracker = MotionTracker(sync, 100, noise=0.05 if equal else JointNoise(sd, cosines))
-        tracks = tracker.fit(poses, groups=bends.actor[~held]).track(seen)
+        sync, noise = DenseSynchronizer(metric=None, refine=False), JointNoise(sd, cosines)
+        tracker = MotionTracker(sync, 100, noise=0.05 if equal else noise)
+        tracks = tracker.fit(poses, groups=groups).track(seen)
         off = [t.poses - x for t, x in zip(tracks, cosines.transform(new), strict=True)]
         errors.append(np.sqrt(np.mean(np.square(np.concatenate(off)))))
         assert equal or np.mean([t.lost.mean() for t in tracks]) <= 0.02
     assert errors[1] < 0.75 * errors[2]
 
 
-def test_bands_of_another_action_are_wider_and_hold_as_often(hdm05, of_bends):
+@pytest.fixture(scope="module")
+def jogs(hdm05, people):
+    """Poses of two jogs."""
+    chosen = np.flatnonzero(hdm05.target == "jogLeftCircle4StepsRstart")[:2]
+    return people[3].transform([hdm05.data[i][::4] for i in chosen])
+
+
+def test_bands_of_another_action_are_wider_and_hold_as_often(jogs, of_bends):
     """Of hidden arms, as evidence makes them wider; people held out, and jogs under bends."""
-    jogs = np.flatnonzero(hdm05.target == "jogLeftCircle4StepsRstart")[:2]
-    cosines = DirectionCosines(hdm05.skeleton)
-    others = [x[::4] for x in cosines.fit_transform([hdm05.data[i] for i in jogs])]
     tracker, own = of_bends
-    inside, widths = [], []
-    for takes in (own[:3], others):
+    inside, widths, hidden = [], [], LIMBS[8:10].ravel()
+    for takes in (own[:3], jogs):
         seen = [x + 0.05 * np.random.default_rng(0).standard_normal(x.shape) for x in takes]
         for x in seen:
-            x[:, LIMBS[8:10].ravel()] = np.nan
-        tracks = tracker.track(seen)
-        std = [np.sqrt(np.diagonal(t.covariances, axis1=1, axis2=2)) for t in tracks]
-        hidden = LIMBS[8:10].ravel()
-        near = [
-            (np.abs(t.poses - x) <= 1.645 * s)[:, hidden]
-            for t, x, s in zip(tracks, takes, std, strict=True)
-        ]
-        inside.append(np.concatenate(near).mean())
-        widths.append(np.concatenate(std)[:, hidden].mean())
-
+            x[:, hidden] = np.nan
+        tracks, truth = tracker.track(seen), np.concatenate(takes)[:, hidden]
+        poses = np.concatenate([t.poses for t in tracks])[:, hidden]
+        variances = np.concatenate([t.covariances for t in tracks])[:, hidden, hidden]
+        inside.append(np.mean(np.abs(poses - truth) <= 1.645 * np.sqrt(variances)))
+        widths.append(np.sqrt(variances).mean())
     assert widths[1] > 1.3 * widths[0]
     assert inside[1] > inside[0] - 0.05
 
 
-def test_jogging_is_lost_under_a_model_of_bends(hdm05, bends):
-    jog = hdm05.data[np.flatnonzero(hdm05.target == "jogLeftCircle4StepsRstart")[0]]
-    *X, jog = (
-        x[::4] for x in DirectionCosines(hdm05.skeleton).fit_transform([*bends.data[:6], jog])
-    )
+def test_jogging_is_lost_under_a_model_of_bends(jogs, people):
+    X = people[3].transform(people[0][:6])
     tracker = MotionTracker(LinearSynchronizer(), 100).fit(X)
-    assert tracker.track(jog).lost.mean() > 0.4
+    assert tracker.track(jogs[0]).lost.mean() > 0.4
     assert not tracker.track(X[0]).lost.any()

@@ -19,6 +19,8 @@ from sklearn_motionsync.display import CycleDisplay
 from sklearn_motionsync.takes import CycleSegmenter
 from sklearn_motionsync.takes.stretches import SampledStretch, Stretch, locate_cycles
 
+from made_bodies import standing, turned
+
 HIP = 0
 
 
@@ -91,18 +93,13 @@ def test_phases_follow_takes_that_slow_down(n_cycles, n_frames):
     assert lengths[-1] > 1.25 * lengths[0]
 
 
-def test_cycles_begin_at_the_maximum_of_the_start_feature(gait):
-    for start, name in ((1, "x1"), ("x2", "x2")):
-        segmenter = CycleSegmenter(start=start).fit(gait.data[:2])
-        assert segmenter.start_ == name
-        k = int(name[1])
-        cycles, _ = segmenter.segment(gait.data[:2])
-        ends = np.mean([c[0, k] for c in cycles])
-        assert ends > np.quantile(np.concatenate(cycles)[:, k], 0.9)
-    with pytest.raises(ValueError, match="no feature 'knee'; there are 4: x0, x1, x2, x3"):
-        CycleSegmenter(start="knee").fit(gait.data)
-    with pytest.raises(ValueError, match="start='ahead' needs a skeleton in space"):
-        CycleSegmenter(start="ahead").fit(gait.data)
+@pytest.mark.parametrize(("start", "k"), [(1, 1), ("x2", 2)])
+def test_cycles_begin_at_the_maximum_of_the_start_feature(start, k, gait):
+    segmenter = CycleSegmenter(start=start).fit(gait.data[:2])
+    assert segmenter.start_ == f"x{k}"
+    cycles, _ = segmenter.segment(gait.data[:2])
+    ends = np.mean([c[0, k] for c in cycles])
+    assert ends > np.quantile(np.concatenate(cycles)[:, k], 0.9)
 
 
 def test_cycles_begin_by_default_with_the_feature_that_repeats_best():
@@ -158,32 +155,18 @@ def test_score_is_the_cosine_with_the_pattern(size):
         assert list(locate_cycles(take, phases, pattern, False)) == []
 
 
-def body_at_rest(n_frames):
-    """The joints (n_frames, 15, 3) of a body that stands and faces along z."""
-    place = {"pelvis": (0, 1), "neck": (0, 1.5), "head": (0, 1.7)}
-    height = {"hip": 1, "knee": 0.5, "ankle": 0.05, "shoulder": 1.5, "elbow": 1.2, "wrist": 1}
-    joints = np.zeros((n_frames, 15, 3))
-    for k, joint in enumerate(Skeleton.paper().joints):
-        side, _, part = joint.rpartition("_")
-        joints[:, k, 0] = {"left": 0.2, "right": -0.2, "": 0}[side]
-        joints[:, k, 1] = height.get(part, place.get(joint, (0, 1))[1])
-    return joints
-
-
 def test_cycles_begin_with_the_foot_that_is_farther_ahead():
     """Legs that swing, the left one farther, of a body that walks in a curve."""
     skeleton, t = Skeleton.paper(), np.linspace(0, 1, 400)
-    joints = body_at_rest(len(t))
+    joints = np.tile(standing().reshape(15, 3), (400, 1, 1))
     for k, joint in enumerate(skeleton.joints):
         side = 1 if joint.startswith("left") else -1
         swing = {"knee": 0.15, "ankle": 0.4}.get(joint.split("_")[-1], 0)
         swing *= 1.2 if side > 0 else 1
         joints[:, k, 2] = side * swing * np.cos(2 * np.pi * (5 * t - 0.3))
-    turn = 3 * t[:, np.newaxis]
-    x, z = joints[..., 0] + 2, joints[..., 2].copy()
-    joints[..., 0] = x * np.cos(turn) + z * np.sin(turn)
-    joints[..., 2] = z * np.cos(turn) - x * np.sin(turn)
-    take = joints.reshape(len(t), -1)
+    joints[..., 0] += 2
+    take = np.stack([turned(x, a) for x, a in zip(joints, np.rad2deg(3 * t), strict=True)])
+    take = take.reshape(400, -1)
     for start, name, phase in ((None, "left", 0.3), ("right", "right", 0.8)):
         segmenter = CycleSegmenter(skeleton, start=start).fit(take)
         assert segmenter.start_ == name
@@ -193,26 +176,28 @@ def test_cycles_begin_with_the_foot_that_is_farther_ahead():
         np.testing.assert_allclose(locations["start"], true[: len(locations)], atol=3)
 
 
-@pytest.mark.parametrize(("swing", "is_foot"), [(0.03, False), (0.04, True)])
+@pytest.mark.parametrize(("swing", "is_foot"), [(0.031, False), (0.042, True)])
 def test_cycles_begin_with_a_foot_in_gait_only(swing, is_foot):
-    """A body that nods; its ankles move against each other by four swings, of a leg of 0.95."""
-    t = np.linspace(0, 1, 400)
-    joints = body_at_rest(len(t))
-    nod = np.sin(2 * np.pi * 5 * t)
+    """A body that nods; its ankles move against each other by four swings, of a leg of a metre."""
+    joints = np.tile(standing().reshape(15, 3), (400, 1, 1))
+    nod = np.sin(2 * np.pi * 5 * np.linspace(0, 1, 400))
     joints[:, 2] += nod[:, np.newaxis] * [0, -0.1, 0.3]
     joints[:, [8, 14], 2] += swing * nod[:, np.newaxis] * [1, -1]
-    start = CycleSegmenter(Skeleton.paper()).fit(joints.reshape(len(t), -1)).start_
+    start = CycleSegmenter(Skeleton.paper()).fit(joints.reshape(400, -1)).start_
     assert (start in ("left", "right")) == is_foot
+
+
+def steps(weaker=1.0):
+    """Steps of 40 frames, of which every second one may be weaker."""
+    angle = 2 * np.pi * np.arange(640)[:, np.newaxis] / 40
+    strengths = np.repeat(np.tile([1, weaker], 8), 40)
+    return (np.sin(angle + np.arange(3)) + 0.5 * np.cos(2 * angle)) * strengths[:, np.newaxis]
 
 
 def test_warns_where_several_cycles_fit_and_period_selects_one():
     """Every second step is stronger: a cycle may be a step, or two."""
-    angle = 2 * np.pi * np.arange(640)[:, np.newaxis] / 40
-    steady = np.sin(angle + np.arange(3)) + 0.5 * np.cos(2 * angle)
-    beat = steady * np.repeat(np.tile([1, 0.4], 8), 40)[:, np.newaxis]
-    segmenter = CycleSegmenter()
+    segmenter, X = CycleSegmenter(), [steps(), steps(0.4)]
     message = r"Trial 1: several cycles fit, of 38\.\d, 80\.0 frames; 80\.0 is taken"
-    X = [steady, beat]
     report = segmenter.report(X)
     assert [len(periods) for periods in report["periods"]] == [1, 2]
     assert report["period"][1] == report["periods"][1][1]
@@ -221,16 +206,14 @@ def test_warns_where_several_cycles_fit_and_period_selects_one():
             method(X)
     chosen = CycleSegmenter(period=(20, 60)).fit(X)
     np.testing.assert_allclose(chosen.periods_, report["periods"][1][0], rtol=0.1)
-    assert len(chosen.segment([beat])[0]) >= 14
+    assert len(chosen.segment(X[1:])[0]) >= 14
     with pytest.raises(ValueError, match=r"not cyclic within period=\(8, 12\)"):
         CycleSegmenter(period=(8, 12)).fit(X)
 
 
 def test_of_several_cycles_that_fit_the_learnt_one_is_taken():
     """The fit has seen steps that are alike; later every second one is stronger."""
-    angle = 2 * np.pi * np.arange(640)[:, np.newaxis] / 40
-    steady = np.sin(angle + np.arange(3)) + 0.5 * np.cos(2 * angle)
-    beat = steady * np.repeat(np.tile([1, 0.4], 8), 40)[:, np.newaxis]
+    steady, beat = steps(), steps(0.4)
     segmenter = CycleSegmenter(start=0).fit([steady])
     assert segmenter.report([beat])["period"][0] == pytest.approx(80, rel=0.05)
     _, locations = segmenter.segment([beat])  # a warning is an error
@@ -242,13 +225,10 @@ def test_of_several_cycles_that_fit_the_learnt_one_is_taken():
     with pytest.warns(UserWarning, match="several cycles fit"):
         mixed = CycleSegmenter(start=0).fit([steady, beat])
     slow = CycleSegmenter(start=0).fit([np.repeat(steady, 8, axis=0)])
-    for other in (mixed, slow):
-        with pytest.warns(UserWarning, match=r"several cycles fit, of .* 80\.0 is taken"):
-            other.segment([beat])
-    # Alone, the weaker steps would not make a take cyclic.
-    faint = steady * np.repeat(np.tile([1, 0.15], 8), 40)[:, np.newaxis]
-    with pytest.warns(UserWarning, match=r"several cycles fit, of .* 80\.\d is taken"):
-        segmenter.segment([faint])
+    # Alone, much weaker steps would not make a take cyclic.
+    for other, take in ((mixed, beat), (slow, beat), (segmenter, steps(0.15))):
+        with pytest.warns(UserWarning, match=r"several cycles fit, of .* 80\.\d is taken"):
+            other.segment([take])
 
 
 def squats(sizes, bounces=None):
@@ -259,18 +239,12 @@ def squats(sizes, bounces=None):
     return np.concatenate([a * (bounced if k == bounces else one) for k, a in enumerate(sizes)])
 
 
-def labelled(take, label):
-    table = pd.DataFrame(take)
-    table.attrs["trial"] = label
-    return table
-
-
 def test_segment_warns_of_cycles_that_hold_several_repetitions():
     """Two shallow squats are nearer to standing than to a squat: the phase stands still."""
     tired, well = squats([1] * 6 + [0.2] * 2 + [1] * 2), squats([1] * 10)
     segmenter = CycleSegmenter(start=0).fit([well])
     segmenter.segment([well])  # a warning is an error
-    X = [labelled(well, "first"), labelled(tired, "second")]
+    X = to_trials(to_frame([well, tired], trials=["first", "second"]))
     message = (
         r"Trial 1 \('second'\): the cycle from start 440 to stop 681 has 241 frames, but the "
         r"period of the take is 80\.0\. It may hold several repetitions, .* 1 of 16 whole cycles\. "
@@ -329,8 +303,7 @@ def test_takes_that_are_not_cyclic_can_be_skipped(gait):
     mixed = [still, *gait.data[:2], gait.data[0][:60]]
     cycles, locations = fit_and_segment(skip, mixed)
     expected, alone = fit_and_segment(CycleSegmenter(start=HIP), gait.data[:2])
-    assert locations["take"].tolist() == (alone["take"] + 1).tolist()
-    assert all(map(np.array_equal, cycles, expected))
+    assert_same((cycles, locations.assign(take=locations["take"] - 1)), (expected, alone))
     assert np.isnan(skip.periods_).tolist() == [True, False, False, True]
     assert np.isnan(skip.phases([still])[0]).all()
     nothing, locations = skip.segment([still])
@@ -357,28 +330,48 @@ def test_errors_name_the_bad_take(change, message, gait, fitted):
             method(bad)
 
 
-def test_refuses_wrong_input_and_parameters(gait, fitted):
-    with pytest.raises(ValueError, match="0 trials"):
-        CycleSegmenter().fit([])
-    with pytest.raises(ValueError, match=r"one take \(n_frames, n_features\), or a list"):
-        fitted.segment(gait.data[0][:, 0])
-    with pytest.raises(ValueError, match=r"A set of trials is .*got float"):
-        fitted.segment(3.0)
-    with pytest.raises(ValueError, match="3 features a frame, but CycleSegmenter is expecting 4"):
-        fitted.segment([x[:, :3] for x in gait.data])
-    with pytest.raises(ValueError, match="3 features a frame, but CycleSegmenter is expecting 4"):
-        fitted.phases([x[:, :3] for x in gait.data])
-    joints = ["pelvis", "neck", "left_knee", "left_ankle", "right_knee", "right_ankle"]
-    legs, take = Skeleton(joints, [-1, 0, 0, 2, 0, 4]), np.tile(gait.data[0], 5)[:, :18]
-    with pytest.raises(ValueError, match=r"start='ahead' needs a skeleton .* hips or shoulders"):
-        CycleSegmenter(legs, start="ahead").fit(take + np.arange(18))
-    for params in ({"threshold": 2}, {"not_cyclic": "drop"}, {"skeleton": "paper"}, {"start": 1.5}):
-        with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
-            CycleSegmenter(**params).report(gait.data)
+@pytest.mark.parametrize(
+    ("X", "message"),
+    [
+        (np.zeros(9), r"one take \(n_frames, n_features\), or a list"),
+        (3.0, r"A set of trials is .*got float"),
+        ([np.zeros((99, 3))], "3 features a frame, but CycleSegmenter is expecting 4"),
+    ],
+)
+def test_refuses_wrong_takes(X, message, fitted):
+    for method in (fitted.segment, fitted.phases):
+        with pytest.raises(ValueError, match=message):
+            method(X)
+
+
+LEGS = ["pelvis", "neck", "left_knee", "left_ankle", "right_knee", "right_ankle"]
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"start": "knee"}, "no feature 'knee'; there are 18: x0, x1, x2"),
+        ({"start": "ahead"}, "start='ahead' needs a skeleton in space"),
+        (
+            {"start": "ahead", "skeleton": Skeleton(LEGS, [-1, 0, 0, 2, 0, 4])},
+            r"start='ahead' needs a skeleton .* hips or shoulders",
+        ),
+        *(
+            ({name: value}, f"The '{name}' parameter")
+            for name, value in (
+                ("threshold", 2), ("not_cyclic", "drop"), ("skeleton", "paper"), ("start", 1.5)
+            )
+        ),
+        *(
+            ({"period": period}, "period must be two numbers of frames, the least")
+            for period in ((40,), (60, 40), (1.9, 60), (2, np.nan), ("20", "60"))
+        ),
+    ],
+)  # fmt: skip
+def test_refuses_wrong_parameters(params, message, gait):
+    with pytest.raises(ValueError, match=message):
+        CycleSegmenter(**params).fit(np.tile(gait.data[0], 5)[:, :18] + np.arange(18))
     CycleSegmenter(period=(2, 60)).report(gait.data)
-    for period in ((40,), (60, 40), (1.9, 60), (2, np.nan), ("20", "60")):
-        with pytest.raises(ValueError, match="period must be two numbers of frames, the least"):
-            CycleSegmenter(period=period).report(gait.data)
 
 
 # -- the contract -----------------------------------------------------------------------------
@@ -419,18 +412,16 @@ def assert_same(answer, expected):
 
 def test_segment_gives_equal_results_for_every_kind_of_collection(gait):
     X = [x[:380] for x in gait.data[:2]]
-    before = [x.copy() for x in X]
     expected = fit_and_segment(CycleSegmenter(start=HIP), X)
     for given in (np.stack(X), to_frame(X, columns=list("hkaf"))):
         assert_same(fit_and_segment(CycleSegmenter(start=HIP), given), expected)
-    assert all(map(np.array_equal, X, before))
     takes = to_frame(X, trials=["ann", "bob"], columns=list("hkaf"))
     cycles, locations = fit_and_segment(CycleSegmenter(start="h"), takes)
     assert set(locations["take"]) == {"ann", "bob"}
     assert to_frame(cycles).index.names == ["trial", "part", "frame"]
 
 
-def test_a_single_take_is_a_list_of_one(gait):
+def test_a_single_take_is_a_list_of_one(gait, fitted):
     take = gait.data[0]
     expected = fit_and_segment(CycleSegmenter(start=HIP), [take])
     assert_same(fit_and_segment(CycleSegmenter(start=HIP), take), expected)
@@ -439,15 +430,12 @@ def test_a_single_take_is_a_list_of_one(gait):
     assert_same((cycles, locations), expected)
     assert cycles[1].attrs["trial"] == (0, 1)
     assert list(to_frame(cycles).index.names) == ["take", "part", "frame"]
-
-
-def test_segment_treats_takes_independently(gait, fitted):
-    _, locations = fitted.segment(gait.data)
+    # A take among others is cut as alone.
+    _, whole = fitted.segment(gait.data)
     for i in (5, 0):
-        own = fitted.segment([gait.data[i]])[1]
-        mine = (locations["take"] == i).to_numpy()
-        assert own["start"].tolist() == locations["start"][mine].tolist()
-        assert own["score"].tolist() == locations["score"][mine].tolist()
+        alone = fitted.segment([gait.data[i]])[1]
+        among = whole[whole["take"] == i].assign(take=0).reset_index(drop=True)
+        pd.testing.assert_frame_equal(alone, among)
 
 
 def test_float32_is_cut_at_the_same_frames(gait, fitted):
