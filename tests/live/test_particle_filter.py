@@ -24,7 +24,6 @@ from sklearn_motionsync.live.state_space import (
 )
 from sklearn_motionsync.live.tracker import Observer
 
-
 RNG, T = np.random.default_rng(0), np.linspace(0, 1, 25)[:, np.newaxis]
 X = np.stack([np.sin(4 * T + RNG.uniform(0, 1, 3)) * RNG.uniform(0.7, 1.3, 3) for _ in range(6)])
 NOISE = 0.01 * np.eye(3)

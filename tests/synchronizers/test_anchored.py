@@ -12,7 +12,6 @@ from sklearn_motionsync import (
     PartSynchronizer,
 )
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.live import OnlineSynchronizer
 
 P = 60
 
@@ -60,18 +59,6 @@ def test_nothing_given_and_nothing_known_give_the_same(bunch):
     # Only the pattern has one, which anchors no pair.
     np.testing.assert_allclose(sync.match(bunch.data).times, plain.match(bunch.data).times)
     np.testing.assert_allclose(sync.transform(bunch.data), plain.transform(bunch.data))
-
-
-def test_a_row_that_is_not_known_may_be_none(bunch):
-    K = [list(row) for row in bunch.keyframes[:, :2]]
-    K[3], K[5][1] = None, np.nan
-    sync = DenseSynchronizer(P).fit(bunch.data, keyframes=K)
-    met = at_keyframes(sync, sync.match(bunch.data, keyframes=K))
-    wanted = shares(bunch, bunch.keyframes[:, :2])
-    known = np.ones_like(wanted, dtype=bool)
-    known[3], known[5, 1] = False, False
-    np.testing.assert_allclose(met[known], wanted[known], atol=1e-9)
-    assert np.abs(met - wanted)[~known].max() < 0.05
 
 
 @pytest.mark.parametrize("pattern", [4, "array"])
@@ -122,15 +109,6 @@ def test_the_disparity_space_shows_the_anchored_path(bunch):
     assert abs(moment + free.path[moment] - wanted) > 1
 
 
-def test_results_do_not_depend_on_company(bunch):
-    K = bunch.keyframes[:, [1, 3]].copy()
-    K[6] = np.nan
-    sync = DenseSynchronizer(P, pattern=0).fit(bunch.data, keyframes=K)
-    times = sync.match(bunch.data, keyframes=K).times
-    alone = sync.match(bunch.data[5:6], keyframes=K[5:6]).times[0]
-    np.testing.assert_array_equal(alone, times[5])
-
-
 def test_a_sample_takes_its_own_keyframes(bunch):
     K = bunch.keyframes[:, [2]]
     sync = DenseSynchronizer(P, max_fit=5).fit(bunch.data, keyframes=K)
@@ -154,14 +132,6 @@ def test_parts_follow_a_body_that_is_anchored(bunch):
     np.testing.assert_array_equal(strong.match_parts(bunch.data, K)["a"].times, body.times)
     # A weak coupling lets the part be early or late.
     assert np.abs(parts["a"].times - body.times).max() > 0.1
-
-
-def test_the_live_synchronizer_learns_from_keyframes(bunch):
-    K = bunch.keyframes[:, [2]]
-    live = OnlineSynchronizer(DenseSynchronizer(P)).fit(bunch.data, keyframes=K)
-    warped = DenseSynchronizer(P).fit_transform(bunch.data, keyframes=K)
-    np.testing.assert_allclose(live.mean_, warped.mean(axis=0))
-    assert live.track(bunch.data[:1])[0].phase[-1] > 0.8 * (P - 1)
 
 
 def test_every_trial_has_one_row_of_a_table(bunch):

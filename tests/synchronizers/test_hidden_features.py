@@ -96,18 +96,6 @@ def test_what_was_hidden_stays_nan(name):
             assert np.isfinite(getattr(sync, attribute)).all()
 
 
-def test_a_feature_that_one_trial_never_shows():
-    sync = DenseSynchronizer(P)
-    X = [x.copy() for x in WHOLE]
-    X[2][:, 4] = np.nan
-    expected = DenseSynchronizer(P).fit(WHOLE).match(WHOLE)
-    found = sync.fit(X).match(X)
-    assert mean_error(found.times, expected.times) < 0.5 * np.abs(expected.offsets).mean()
-    out = sync.transform(X)
-    assert np.isnan(out[2, :, 4]).all()
-    assert np.isnan(out).sum() == P
-
-
 def test_rows_and_memory_maps(tmp_path):
     rows = np.stack([np.resize(x[:, 3], 50) for x in GAPPY])
     assert np.isnan(rows).any()
@@ -116,13 +104,6 @@ def test_rows_and_memory_maps(tmp_path):
     out = clone(DENSE).fit(maps).transform(maps)
     alone = clone(DENSE).fit(list(rows[:, :, None])).transform(list(rows[:, :, None]))
     np.testing.assert_array_equal(out, alone[:, :, 0])
-
-
-def test_a_warp_depends_on_its_trial_alone():
-    sync = clone(DENSE).fit(GAPPY)
-    together = sync.match(GAPPY)
-    for i, x in enumerate(GAPPY):
-        np.testing.assert_array_equal(sync.match([x]).times[0], together.times[i])
 
 
 # -- what is refused ------------------------------------------------------------------------
@@ -192,8 +173,6 @@ def test_filling_keeps_pandas_and_single_precision_and_rows():
     table = clone(DENSE).set_output(transform="pandas").fit(GAPPY).transform(GAPPY, fill="model")
     expected = clone(DENSE).fit(GAPPY).transform(GAPPY, fill="model")
     np.testing.assert_array_equal(table.to_numpy().reshape(expected.shape), expected)
-    rows = np.stack([np.resize(x[:, 3], 50) for x in GAPPY])
-    assert np.isfinite(clone(DENSE).fit(rows).transform(rows, fill="model")).all()
 
 
 @pytest.mark.parametrize("fill", ["mean", 0, True])
@@ -286,16 +265,6 @@ def test_wrong_confidence_is_refused(case):
     given, message = WRONG[case]
     with pytest.raises(ValueError, match=message):
         clone(DENSE).fit(WHOLE, confidence=given)
-
-
-# -- displays, lags and tables --------------------------------------------------------------
-
-
-def test_lags_and_tables_of_trials_with_gaps():
-    parts = clone(SYNCHRONIZERS["parts"]).fit(GAPPY)
-    assert np.isfinite(parts.lags(GAPPY).values).all()
-    table = parts.match(GAPPY).to_frame("percent", GAPPY)
-    assert np.isfinite(table.to_numpy()).all()
 
 
 def test_the_trellis_that_is_drawn_is_that_of_the_match():

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
-    ActionModel,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
@@ -65,28 +64,20 @@ def test_the_pattern_is_certain_of_itself(fitted, bending_aspace):
     np.testing.assert_allclose(upper, lower, atol=1e-6)
 
 
-def test_one_trial_by_itself_has_the_same_intervals(fitted, bending_aspace):
-    several = bending_aspace[12:16]
-    together = fitted.match(several)
-    for i, x in enumerate(several):
-        alone = fitted.match([x])
-        for one, all_ in zip(alone.interval(0.8), together.interval(0.8), strict=True):
-            np.testing.assert_array_equal(one[0], all_[i])
-        assert alone.reasons[0] == together.reasons[i]
-
-
 def test_trials_in_parts_have_the_same_intervals(bending_aspace, monkeypatch, tmp_path):
     X = np.stack([x[np.linspace(0, len(x) - 1, 50).astype(int)] for x in bending_aspace[:14]])
     sync = DenseSynchronizer(P).fit(X)
     np.save(tmp_path / "X.npy", X)
     monkeypatch.setattr(validation, "MANY", 5)
     in_parts, whole = sync.match(np.load(tmp_path / "X.npy", mmap_mode="r")), sync.match(X)
-    wanted = whole.interval()
-    # A match tells of the fit that it is from.
+    alone, wanted = sync.match(X[3:4]), whole.interval()
+    # A match tells of the fit that it is from, also when it was stored.
     sync.fit(X[:3])
-    for one, other in zip(in_parts.interval(), wanted, strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert in_parts.reasons == whole.reasons
+    for match in (in_parts, pickle.loads(pickle.dumps(whole))):
+        np.testing.assert_array_equal(match.interval(), wanted)
+        assert match.reasons == whole.reasons
+    np.testing.assert_array_equal(alone.interval(), np.array(wanted)[:, 3:4])
+    assert alone.reasons == whole.reasons[3:4]
 
 
 def test_units(fitted, bending_aspace):
@@ -126,35 +117,21 @@ def test_refused_coverages(wrong, fitted, bending_aspace):
 
 
 def test_matches_that_do_not_tell(bending, bending_aspace):
-    keyframes = [k[:1] for k in bending.keyframes[:5]]
-    matches = [
+    X, given = bending_aspace[:5], {"keyframes": [k[:1] for k in bending.keyframes[:5]]}
+    linear, parts = LinearSynchronizer(P), PartSynchronizer({"first": [0], "second": [1]})
+    for match in (
         Match(np.tile(np.arange(5.0), (2, 1))),
-        LinearSynchronizer(P).fit(bending_aspace[:5]).match(bending_aspace[:5]),
-        LinearSynchronizer(P)
-        .fit(bending_aspace[:5], keyframes=keyframes)
-        .match(bending_aspace[:5], keyframes=keyframes),
-        PartSynchronizer({"first": [0], "second": [1]})
-        .fit(bending_aspace[:5])
-        .match_parts(bending_aspace[:5])["first"],
-    ]
-    for match in matches:
-        with pytest.raises(ValueError, match=r"only DenseSynchronizer\.match does"):
-            match.interval()
-        with pytest.raises(ValueError, match=r"only DenseSynchronizer\.match does"):
-            _ = match.doubtful
-        with pytest.raises(ValueError, match=r"only DenseSynchronizer\.match does"):
-            match.to_frame(coverage=0.9)
-
-
-def test_a_match_of_a_pipeline_tells_and_pickles(bending):
-    pipe = make_pipeline(
-        DirectionCosines(bending.skeleton), ASpace(), DenseSynchronizer(P), ActionModel()
-    ).fit(bending.data[:8])
-    match = Match.from_estimator(pipe, bending.data[8:10])
-    copy = pickle.loads(pickle.dumps(match))
-    for one, other in zip(match.interval(0.7), copy.interval(0.7), strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert copy.reasons == match.reasons == [None, None]
+        linear.fit(X).match(X),
+        linear.fit(X, **given).match(X, **given),
+        parts.fit(X).match_parts(X)["first"],
+    ):
+        for tell in (
+            match.interval,
+            lambda m=match: m.doubtful,
+            lambda m=match: m.to_frame(coverage=0.9),
+        ):
+            with pytest.raises(ValueError, match=r"only DenseSynchronizer\.match does"):
+                tell()
 
 
 def test_single_precision_and_several_jobs(bending_aspace):
@@ -189,7 +166,7 @@ def test_coverage_of_people_held_out(real_data, benchmark):
     harness = benchmark("harness")
     shown = harness.BEND, harness.ELBOW, harness.STAND
     chosen = [event for event in harness.EVENTS if event[:2] in shown]
-    inside, n = [], 0
+    inside = []
     for one in harness.read_people(real_data, chosen, patterns=4):
         actors = np.asarray(one.actors)
         for actor in np.unique(actors):
@@ -207,8 +184,7 @@ def test_coverage_of_people_held_out(real_data, benchmark):
                     if np.isfinite(moment + at[i]):
                         low, high = (np.interp(moment, np.arange(100), x) for x in (low, high))
                         inside.append(low <= at[i] <= high)
-    n = len(inside)
-    assert n > 60
+    assert len(inside) > 60
     assert 0.87 < np.mean(inside) <= 1
 
 
@@ -298,15 +274,12 @@ def test_calibration_by_keyframes(bending, bending_aspace):
     inside = []
     for x, k, low, high in zip(bending_aspace[25:], others, lower, upper, strict=True):
         at = np.asarray(k) * (P - 1) / (len(x) - 1)
-        bounds = (np.interp(own, np.arange(P), b) for b in (low, high))
-        inside.extend(np.logical_and(*(op(b, at) for op, b in zip(_SIDES, bounds, strict=True))))
+        low, high = (np.interp(own, np.arange(P), bounds) for bounds in (low, high))
+        inside.extend((low <= at) & (at <= high))
     assert 0.75 < np.mean(inside) <= 1
     again = sync.interval_factor_
     sync.calibrate(bending_aspace[known], bending.keyframes[known])
     np.testing.assert_allclose(sync.interval_factor_, again)
-
-
-_SIDES = np.less_equal, np.greater_equal
 
 
 def test_calibration_by_too_few_keyframes(bending, bending_aspace, fitted):

@@ -1,7 +1,5 @@
 """Refinement: one number tells copies of one source from people; and what refining brings."""
 
-import math
-
 import numpy as np
 import pytest
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
@@ -53,21 +51,14 @@ def test_number_equals_its_formula(known_warps):
     sync = DenseSynchronizer(80, metric=None).fit(X)
     voted = DenseSynchronizer(80, metric=None, refine=False).fit(X)
     others = np.delete(np.arange(len(X)), sync.pattern_index_)
-    weights = [(-1) ** k * math.comb(6, k) for k in range(7)]
-
-    def white(x):
-        differences = [sum(w * x[i + k] for k, w in enumerate(weights)) for i in range(len(x) - 6)]
-        return np.square(differences).mean(axis=0) / math.comb(12, 6)
-
-    noise = np.mean([white(X[k]) for k in (sync.pattern_index_, *others)], axis=0)
+    noise = white_noise([X[k] for k in (sync.pattern_index_, *others)])
     aligned, left = voted.transform([X[k] for k in others]), []
     for warped in aligned:
         variance = np.square(warped - sync.pattern_).mean(axis=0) - (1 + 2 / 3) * noise
         left.append(np.maximum(variance, 0).sum())
     moving = np.maximum(sync.pattern_.var(axis=0) - noise, 0).sum()
     expected = np.median(left) / moving
-    measured = white_noise([X[k] for k in (sync.pattern_index_, *others)])
-    assert unexplained_variance(sync.pattern_, aligned, measured) == pytest.approx(expected)
+    assert unexplained_variance(sync.pattern_, aligned, noise) == pytest.approx(expected)
     # Direct paths tell as much as voted ones.
     assert sync.unexplained_variance_ == pytest.approx(expected, rel=0.3)
     assert sync.refines_ == (sync.unexplained_variance_ < 0.025)
