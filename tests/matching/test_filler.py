@@ -9,7 +9,6 @@ from sklearn_motionsync.matching.costs import COSTS, step_table
 from sklearn_motionsync.matching.gaps import (
     SHRINKAGE,
     Filler,
-    add_weights,
     interpolate_gaps,
     moments_of_seen,
 )
@@ -28,21 +27,14 @@ def kept(request, monkeypatch):
     monkeypatch.setattr(module, "ROW_BYTES", row_bytes)
 
 
-def brute_force(x, y, weights, others, costs, mu, subframes, reach, unseen):
-    """The smallest cost of all paths, each added up frame by frame, and the paths that have it."""
-    totals, paths = [], known_paths(len(x), tuple(sorted(costs)), subframes, reach)
-    for path in paths:
-        total = 0.0
-        for p, q in enumerate(path):
-            step = subframes if p == 0 else q - path[p - 1]
-            b, g, phi = costs[step]
-            square = x[p] @ x[p] + b * (y[q] @ y[q]) - g * (x[p] @ y[q])
-            w = weights[p] * others[q]
-            total += w * square + (1 - w) * unseen + (p > 0) * mu * phi
-        totals.append(total)
-    best = min(totals)
-    near = np.array(totals) <= best + 1e-9 * max(1.0, best)
-    return best, [tuple(path) for path, is_near in zip(paths, near, strict=True) if is_near]
+def cost_of(path, base, other, costs, mu, unseen, subframes=1):
+    """The cost of one path with gaps, added up frame by frame; weights are the last column."""
+    total = 0.0
+    for p, q in enumerate(path):
+        b, g, phi = costs[subframes if p == 0 else q - path[p - 1]]
+        x, y, w = base[p, :2], other[q, :2], base[p, 2] * other[q, 2]
+        total += w * (x @ x + b * (y @ y) - g * (x @ y)) + (1 - w) * unseen + (p > 0) * mu * phi
+    return total
 
 
 def draw(seed, n_frames, subframes, exact):
@@ -73,17 +65,17 @@ def test_best_path_with_gaps_equals_all_admissible_paths(case, cost, kept):
     bases, moving = draw(n_frames, n_frames, subframes, exact)
     costs = step_costs(cost, max_rate, subframes)
     trellis = Trellis(step_table(cost, max_rate, subframes), mu, reach, unseen=unseen)
-    distances, (disparities, lengths) = (
-        trellis.distances(bases, moving),
-        trellis.paths_and_costs(bases, moving),
-    )
+    distances = trellis.distances(bases, moving)
+    disparities, lengths = trellis.paths_and_costs(bases, moving)
     for n, base in enumerate(bases):
         given = trellis.costs(base, moving, disparities[n])
         for m, other in enumerate(moving):
-            sequences = base[:, :2], other[:, :2], base[:, 2], other[:, 2]
-            best, paths = brute_force(*sequences, costs, mu, subframes, reach, unseen)
-            path = disparities[n, m] + subframes * np.arange(n_frames)
-            assert tuple(path) in paths
+            totals = {
+                tuple(path): cost_of(path, base, other, costs, mu, unseen, subframes)
+                for path in known_paths(n_frames, tuple(sorted(costs)), subframes, reach)
+            }
+            best, path = min(totals.values()), disparities[n, m] + subframes * np.arange(n_frames)
+            assert totals[tuple(path)] <= best + 1e-9 * max(1.0, best)
             if exact:
                 # To the last bit.
                 assert distances[n, m] == lengths[n, m] == given[m] == best
@@ -118,19 +110,9 @@ def test_gaps_and_keyframes_together_equal_all_admissible_paths():
         for m, other in enumerate(moving):
             totals = []
             for path in known_paths(6, tuple(sorted(costs)), 1, 3):
-                only = brute_force_of(path, base, other, costs, mu, unseen)
+                only = cost_of(path, base, other, costs, mu, unseen)
                 totals.append(only + shares[n] @ penalties[m, path])
             np.testing.assert_allclose(distances[n, m], min(totals), rtol=1e-12)
-
-
-def brute_force_of(path, base, other, costs, mu, unseen):
-    """The cost of one path with gaps."""
-    total = 0.0
-    for p, q in enumerate(path):
-        b, g, phi = costs[1 if p == 0 else q - path[p - 1]]
-        x, y, w = base[p, :2], other[q, :2], base[p, 2] * other[q, 2]
-        total += w * (x @ x + b * (y @ y) - g * (x @ y)) + (1 - w) * unseen + (p > 0) * mu * phi
-    return total
 
 
 # -- what fills gaps ------------------------------------------------------------------------
@@ -294,11 +276,3 @@ def test_ends_are_held_and_a_feature_never_seen_has_its_mean():
     gappy[:8, 0], gappy[:, 1] = np.nan, np.nan
     filled, _ = filler(gappy)
     np.testing.assert_allclose(filled, flat[0])
-
-
-def test_weights_are_a_column():
-    X = curves(2)
-    a, b = add_weights(X, [np.arange(80.0), np.ones(80)])
-    np.testing.assert_array_equal(a[:, :5], X[0])
-    np.testing.assert_array_equal(a[:, 5], np.arange(80))
-    np.testing.assert_array_equal(add_weights(X, None)[1], b)

@@ -184,9 +184,12 @@ def test_key_frames_are_refused_if_match_does_not_accept_them(scorer, bunch, poi
 
 
 class EventSynchronizer(LinearSynchronizer):
-    """A synchronizer that requires metadata of another name."""
+    """A synchronizer that requires metadata of another name, and in its fit records weights."""
 
-    def fit(self, X, y=None, *, events):
+    seen = []
+
+    def fit(self, X, y=None, *, events, weights=None):
+        self.seen.append(weights)
         return super().fit(X, keyframes=events)
 
     def match(self, X, *, events):
@@ -195,30 +198,19 @@ class EventSynchronizer(LinearSynchronizer):
 
 @pytest.mark.parametrize("scorer", SCORERS)
 def test_metadata_may_have_any_name(scorer, bunch, points):
-    K = bunch.keyframes
+    K, weights = bunch.keyframes, np.ones(len(points))
     sync = EventSynchronizer(40).fit(points, events=K)
     plain = LinearSynchronizer(40).fit(points, keyframes=K)
     expected = scorer()(plain, points, keyframes=K)
     assert scorer()(sync, points, events=K) == expected
-
-
-class WeighingSynchronizer(LinearSynchronizer):
-    """A synchronizer whose fit alone accepts metadata, and records it."""
-
-    seen = []
-
-    def fit(self, X, y=None, *, weights=None):
-        self.seen.append(weights)
-        return super().fit(X)
-
-
-def test_holdout_passes_metadata_of_fit_to_the_clones(points):
-    sync, weights = WeighingSynchronizer(40).fit(points), np.ones(len(points))
-    sync.seen.clear()
-    FeatureHoldoutScorer(n_folds=2)(sync, points, weights=weights)
-    assert [w is weights for w in sync.seen] == [True, True]
-    with pytest.raises(TypeError, match="got 'weights'"):
-        SpreadScorer()(sync, points, weights=weights)
+    # What a fit alone accepts reaches the clones that are fitted.
+    if scorer is SpreadScorer:
+        with pytest.raises(TypeError, match="got 'weights'"):
+            scorer()(sync, points, events=K, weights=weights)
+    else:
+        sync.seen.clear()
+        scorer(n_folds=2)(sync, points, events=K, weights=weights)
+        assert [w is weights for w in sync.seen] == [True, True]
 
 
 # -- key-frames routed by scikit-learn ----------------------------------------------------

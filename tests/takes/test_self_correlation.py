@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import DirectionCosines, to_frame
-from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync import to_frame
 from sklearn_motionsync.takes import self_correlation
 from sklearn_motionsync.takes.self_correlation import correlate, rejection_reason
 
@@ -139,17 +138,6 @@ def test_still_or_very_short_takes_have_no_period(n_frames):
         assert np.isfinite(found.correlation).all()
 
 
-def test_path_of_the_body_does_not_change_the_period():
-    bunch = make_bending(1, random_state=0)
-    (bend,), cosines = bunch.data, DirectionCosines(bunch.skeleton)
-    once = self_correlation(*cosines.fit_transform([bend]))
-    assert once.strength < 0.3
-    twice = np.concatenate([bend, bend[1:]])
-    path = np.linspace(0, 50, len(twice))[:, np.newaxis] * np.tile([1, 0, 1], 15)
-    found = self_correlation(*cosines.fit_transform([twice + path]))
-    assert found.period == pytest.approx(len(bend) - 1, rel=0.03)
-
-
 @pytest.mark.parametrize(
     ("take", "message"),
     [
@@ -174,17 +162,14 @@ def test_a_wave_under_noise_is_not_rejected():
     assert rejection_reason(correlate(one), 0.4) == ""
 
 
-def test_breadth_is_that_of_poses():
-    t = 2 * np.pi * np.arange(1000) / 200
-    # Velocities have the variances 1 and 4.
-    found = self_correlation(np.column_stack([np.sin(t), np.sin(2 * t)]))
-    assert found.breadth == pytest.approx(2, abs=0.05)
-
-
 def test_breadth_is_the_effective_number_of_dimensions():
+    """Of poses: the velocities of the two waves have the variances 1 and 4."""
     found = correlate(np.eye(8)[np.arange(160) // 5 % 8])
     assert 5 < found.breadth <= 7
     assert correlate(np.sin(np.arange(100.0))[:, np.newaxis]).breadth == pytest.approx(1)
+    t = 2 * np.pi * np.arange(1000) / 200
+    found = self_correlation(np.column_stack([np.sin(t), np.sin(2 * t)]))
+    assert found.breadth == pytest.approx(2, abs=0.05)
 
 
 # -- several cycles fit -------------------------------------------------------------------------

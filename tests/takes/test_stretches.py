@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import CycleDisplay
 from sklearn_motionsync.takes import CycleSegmenter
 from sklearn_motionsync.takes.stretches import find_repeats
@@ -157,14 +156,3 @@ def test_rate_and_unit_change_nothing():
     ((first, last),) = places(gaussian_filter1d(slow, 2, axis=0))
     assert abs(first / 4 - start) < 6
     assert abs(last / 4 - stop) < 6
-
-
-def test_gait_with_standing_is_cut_as_without():
-    bunch = make_gait(4, n_cycles=5, takes=True, random_state=0)
-    scaled = [x / x.std(axis=0) for x in bunch.data]
-    segmenter = CycleSegmenter(start=0).fit(scaled[:3])
-    expected = segmenter.segment(scaled[3:])[1]
-    still = [np.repeat(scaled[3][[k]], 900, axis=0) for k in (0, -1)]
-    table = segmenter.segment([np.concatenate([still[0], scaled[3], still[1]])])[1]
-    assert len(table) == len(expected)
-    assert (table["start"] - 900 - expected["start"]).abs().max() <= 3

@@ -124,14 +124,6 @@ def test_correlation_time_is_where_the_autocorrelation_falls_to_one_over_e():
     assert time_of([rng.standard_normal((99, 3))]) < 1
 
 
-def test_results_of_a_trial_depend_on_no_other():
-    X = hide(low_rank(5), 0.2, run=4)
-    aspace = ASpace(2).fit(X)
-    together = aspace.transform(X)
-    for x, points in zip(X, together, strict=True):
-        np.testing.assert_array_equal(aspace.transform([x])[0], points)
-
-
 # -- people -------------------------------------------------------------------------------
 
 
