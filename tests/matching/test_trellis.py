@@ -60,23 +60,19 @@ def test_best_path_equals_all_admissible_paths(case, cost, whole, dtype, kept):
     bases, moving = bases.astype(dtype), moving.astype(dtype)
     trellis = Trellis(step_table(cost, max_rate, subframes), mu, reach)
     distances = trellis.distances(bases, moving)
-    assert distances.dtype == dtype
     close = {"rtol": 1e-10, "atol": 1e-12} if dtype == np.float64 else {"rtol": 1e-4, "atol": 1e-4}
     disparities = trellis.paths(bases, moving)
     for n, base in enumerate(bases):
         from_paths = trellis.costs(base, moving, disparities[n])
-        assert from_paths.dtype == dtype
+        assert from_paths.dtype == distances.dtype == dtype
         np.testing.assert_allclose(from_paths, distances[n], **close)
         for m, sequence in enumerate(moving):
             x, y = base.astype(float), sequence.astype(float)
-            best, paths = brute_force(x, y, costs, mu, subframes, reach)
+            best, _ = brute_force(x, y, costs, mu, subframes, reach)
             np.testing.assert_allclose(distances[n, m], best, **close)
             path = disparities[n, m] + subframes * np.arange(n_frames)
-            if dtype == np.float64:
-                assert tuple(path) in paths
-            else:
-                cost = path_cost(x, y, path, costs, mu, subframes)
-                np.testing.assert_allclose(cost, best, **close)
+            found = path_cost(x, y, path, costs, mu, subframes)
+            np.testing.assert_allclose(found, best, **close)
 
 
 @pytest.mark.parametrize("cost", COSTS)
@@ -146,27 +142,6 @@ def test_distances_equal_plain_loops(case, cost):
     np.testing.assert_allclose(distances, expected, rtol=1e-10)
 
 
-def test_ties_keep_the_pace():
-    """Between paths of equal cost the diagonal wins: standing still says nothing of time."""
-    still = np.zeros((1, 9, 2))
-    for mu in (0.0, 1.0):
-        trellis = Trellis(step_table(), mu, 4)
-        assert trellis.distances(still, still) == 0
-        assert not trellis.paths(still, still).any()
-
-
-@pytest.mark.parametrize("subframes", [1, 3])
-def test_paths_are_pinned_monotone_and_in_the_band(subframes):
-    bases, moving = draw(np.random.default_rng(2), 4, 50, subframes)
-    table = step_table("pose", max_rate=3, subframes=subframes)
-    disparities = Trellis(table, 0.01, 7).paths(bases, moving)
-    assert (disparities[..., [0, -1]] == 0).all()
-    assert np.abs(disparities).max() <= 7 * subframes
-    steps = np.diff(disparities) + subframes
-    assert steps.min() >= 0
-    assert steps.max() <= 3 * subframes
-
-
 TABLES = [step_table(), step_table("velocity", max_rate=4, subframes=2)]
 
 
@@ -234,14 +209,3 @@ def test_memory_grows_with_the_band():
     tracemalloc.stop()
     assert everything < 2.5e6
     assert little < 0.6e6
-
-
-def test_read_only_inputs_are_not_written():
-    bases, moving = draw(np.random.default_rng(4), 2, 12)
-    copies = bases.copy(), moving.copy()
-    bases.flags.writeable = moving.flags.writeable = False
-    trellis = Trellis(step_table(), 0.5, 4)
-    trellis.distances(bases, moving)
-    trellis.paths(bases, moving)
-    np.testing.assert_array_equal(bases, copies[0])
-    np.testing.assert_array_equal(moving, copies[1])

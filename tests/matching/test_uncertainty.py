@@ -78,16 +78,6 @@ def test_long_clocks_are_compared_at_81_frames():
     np.testing.assert_allclose(found.widest, half.widest, rtol=1e-9)
 
 
-def test_equal_sequences_are_certain():
-    t = np.linspace(0, 1, 60)[:, np.newaxis]
-    x = np.hstack([np.sin(5 * t), np.cos(7 * t)])[np.newaxis]
-    trellis = Trellis.on_clock("pose", 60, 0.01, max_offset=0.25, max_rate=2)
-    matcher = Matcher(Features("pose", 1, 0.0, None), trellis)
-    found = uncertainty_of_paths(matcher, x, x, np.arange(60.0)[np.newaxis])
-    np.testing.assert_allclose(found.half_widths, 0, atol=1e-6)
-    np.testing.assert_allclose(found.shares, 0, atol=1e-12)
-
-
 def test_half_widths_grow_with_the_coverage():
     is_normal = np.array([True, False])
     np.testing.assert_allclose(coverage_factor(0.9, is_normal), 1)

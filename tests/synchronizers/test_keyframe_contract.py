@@ -11,7 +11,6 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     FrameWise,
     LinearSynchronizer,
-    to_frame,
 )
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
@@ -51,15 +50,6 @@ def test_forms_of_keyframes_are_one(form):
     expected = LinearSynchronizer(40).fit_transform(X, keyframes=SOME)
     found = LinearSynchronizer(40).fit_transform(X, keyframes=FORMS[form](SOME))
     np.testing.assert_array_equal(found, expected)
-
-
-def test_forms_of_trials_are_one():
-    """Of synchronizers of other kinds tests/test_seams.py tries it."""
-    sync = LinearSynchronizer(40)
-    expected = sync.fit(X, keyframes=SOME).transform(X, keyframes=SOME)
-    for given in (TABLES, to_frame(TABLES)):
-        found = sync.fit_transform(given, keyframes=pd.DataFrame(SOME, index=INDEX))
-        np.testing.assert_array_equal(np.asarray(found).reshape(expected.shape), expected)
 
 
 @pytest.mark.parametrize(

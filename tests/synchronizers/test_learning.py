@@ -1,7 +1,5 @@
 """The six steps of a fit by hand, small sets, and what a fit that fails leaves."""
 
-import warnings
-
 import numpy as np
 import pytest
 from sklearn_motionsync import (
@@ -102,22 +100,6 @@ def test_few_trials(n, n_features, dtype):
     before = LinearSynchronizer(pattern=sync.pattern_index_).fit_transform(X)
     off, linear = (np.abs(x - sync.pattern_).mean() for x in (aligned, before))
     assert off <= linear
-
-
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_constant_signals_count_for_nothing(dtype):
-    X = [x.astype(dtype) for x in styled(6)]
-    still = [np.concatenate([x, np.full((len(x), 2), [0.1, -3])], axis=1, dtype=dtype) for x in X]
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        sync, plain = DenseSynchronizer().fit(still), DenseSynchronizer().fit(X)
-    assert sync.pattern_index_ == plain.pattern_index_
-    np.testing.assert_array_equal(sync.metric_.share[2:], 0)
-    np.testing.assert_allclose(sync.match(still).times, plain.match(X).times, atol=0.1)
-    nothing = [x[:, 2:] for x in still]
-    sync = DenseSynchronizer().fit(nothing)
-    assert not sync.match(nothing).offsets.any()
-    assert not sync.refines_
 
 
 # -- a fit that fails -----------------------------------------------------------------------

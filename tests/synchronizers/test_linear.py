@@ -3,11 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    LinearSynchronizer,
-)
-from sklearn_motionsync.metrics import group_timing_error, keyframe_error
+from sklearn_motionsync import LinearSynchronizer
+from sklearn_motionsync.metrics import keyframe_error
 
 
 def test_whole_keyframes_coincide_exactly():
@@ -65,19 +62,6 @@ def test_gaps_and_key_frames_together(bending, bending_aspace):
     filled = sync.transform(X, keyframes=K, fill="model")
     assert np.isfinite(filled).all()
     np.testing.assert_array_equal(filled[~np.isnan(warped)], warped[~np.isnan(warped)])
-
-
-def test_timing_errors_with_keyframes_and_without(bending, bending_aspace):
-    key = LinearSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
-    times = {
-        "keyframes": key.match(bending_aspace, keyframes=bending.keyframes).times,
-        "dense": DenseSynchronizer(100).fit(bending_aspace).match(bending_aspace).times,
-        "linear": LinearSynchronizer(100).fit(bending_aspace).match(bending_aspace).times,
-    }
-    errors = {name: group_timing_error(t, bending.times) for name, t in times.items()}
-    assert errors["keyframes"] < 0.5
-    assert errors["dense"] < 0.3
-    assert errors["linear"] > 2
 
 
 # -- bad key-frames -----------------------------------------------------------------------

@@ -182,16 +182,6 @@ def late():
     return Match([np.interp(np.arange(11), [0, 5, 10], [0, peak, 10]) for peak in (7, 4)])
 
 
-def test_offsets_are_positive_where_a_trial_is_later(late):
-    peak = np.exp(-np.square(np.arange(11.0) - 5))[:, np.newaxis]
-    slow = np.interp(np.arange(11), late.times[0], np.arange(11))
-    X = [peak, np.interp(slow, np.arange(11), peak[:, 0])[:, np.newaxis]]
-    assert X[1].argmax() == 7
-    found = DenseSynchronizer(pattern=0, consensus=0, cost="pose").fit(X).match(X)
-    assert found.offsets[1, 5] > 1
-    assert late.offsets[:, 5].tolist() == [2, -1]
-
-
 def test_offsets_in_units(late):
     np.testing.assert_array_equal(late.offsets_in("frames"), late.offsets)
     assert late.offsets_in("percent")[:, 5].tolist() == [20, -10]
