@@ -128,6 +128,7 @@ WRONG_KEYFRAMES = [
     (([[5, 4]], [1, 2], [9]), "Trial 0: key-frames must increase"),
     (([[4, 5]], [2, 1], [9]), "The pattern: key-frames must increase"),
     (([[5]], [4.5], [9]), "The pattern: .* from 0 to 4, in frames of the clock"),
+    (([[0.62, 1.4, 2.5]], [1, 2, 3], [300]), "Trial 0: .* look like seconds"),
     (([[5]], 2, [9]), r"pattern_keyframes must have shape \(n_keyframes,\)"),
     (([[]], [], [9]), "at least one"),
     (([[5], [5]], [2], [9]), r"each of the 1 warp; got the shapes \[\(1,\), \(1,\)\]"),

@@ -1,4 +1,4 @@
-"""DenseSynchronizer and LinearSynchronizer: clock, pattern, warp, known warps, bad input."""
+"""DenseSynchronizer and LinearSynchronizer: clock, pattern, warp, known warps."""
 
 import numpy as np
 import pytest
@@ -137,28 +137,6 @@ def test_warps_equal_smoothed_votes_of_paths(settings, warps):
         times = np.clip(frames + np.clip(offsets, -reach, reach), 0, P - 1)
         expected = np.maximum.accumulate(times) if m != 1 else frames
         np.testing.assert_allclose(sync.match(X).times[m], expected, atol=1e-9)
-
-
-# -- bad input --------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "params",
-    [
-        {"n_frames": 1},
-        {"cost": "dtw"},
-        {"smoothness": -1},
-        {"max_offset": 1.5},
-        {"max_rate": 0.5},
-        {"consensus": 2.5},
-        {"refine": "yes"},
-    ],
-    ids=str,
-)
-def test_fit_refuses_invalid_parameters(params, warps):
-    name = next(iter(params))
-    with pytest.raises(ValueError, match=name):
-        DenseSynchronizer(**params).fit(warps)
 
 
 def test_max_rate_beyond_the_clip_changes_nothing(warps):

@@ -132,11 +132,6 @@ def test_a_feature_that_is_never_seen_is_refused_by_its_name():
     assert np.isfinite(clone(DENSE).fit(WHOLE).match(X).times).all()
 
 
-def test_gaps_of_a_pattern_are_refused():
-    with pytest.raises(ValueError, match=r"The pattern, frame \d+, feature \d is NaN"):
-        DenseSynchronizer(P, pattern=GAPPY[0][:, :]).fit(GAPPY)
-
-
 # -- fill="model" ---------------------------------------------------------------------------
 
 

@@ -205,21 +205,6 @@ def test_trials_that_are_repeated_cut_off_or_still_are_doubtful(fitted, bending_
         assert "it may be cut off, repeated or another movement" in match.reasons[0]
 
 
-def test_trials_of_another_movement_are_doubtful():
-    """A hammer that falls twice, where it falls once in the training set."""
-    rng, t = np.random.default_rng(0), np.linspace(0, 1, 101)
-
-    def trial(strokes):
-        moments = np.array([0.5] if strokes == 1 else [0.3, 0.7]) + rng.uniform(-0.08, 0.08)
-        swing = np.column_stack([t, t + 0.03])
-        height = sum(np.exp(-(((swing - moment) / 0.07) ** 2)) for moment in moments)
-        return rng.uniform(0.9, 1.1) * height + 0.02 * rng.standard_normal((101, 2))
-
-    sync = DenseSynchronizer().fit([trial(1) for _ in range(12)])
-    assert not sync.match([trial(1) for _ in range(8)]).doubtful.any()
-    assert sync.match([trial(2) for _ in range(8)]).doubtful.mean() > 0.6
-
-
 def test_the_way_back_of_a_movement_that_is_alike_both_ways_is_not_doubted(bends):
     """A bend backwards is a bend: docs/howto/timing.md names it."""
     X = make_pipeline(DirectionCosines(bends.skeleton), ASpace()).fit_transform(bends.data)

@@ -1,13 +1,9 @@
-"""The six steps of a fit by hand, small sets, and what a fit that fails leaves."""
+"""The six steps of a fit by hand, and small sets."""
 
 import numpy as np
 import pytest
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    LinearSynchronizer,
-)
+from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
 from sklearn_motionsync.inputs.collections import Trials
-from sklearn_motionsync.synchronizers import learning
 from sklearn_motionsync.synchronizers.learning import (
     finish_warps,
     learn_metric,
@@ -100,23 +96,3 @@ def test_few_trials(n, n_features, dtype):
     before = LinearSynchronizer(pattern=sync.pattern_index_).fit_transform(X)
     off, linear = (np.abs(x - sync.pattern_).mean() for x in (aligned, before))
     assert off <= linear
-
-
-# -- a fit that fails -----------------------------------------------------------------------
-
-
-def test_fit_that_is_interrupted_leaves_the_earlier_one_usable(monkeypatch):
-    X = styled(5)
-    sync = DenseSynchronizer().fit(X)
-    expected, attributes = sync.transform(X), dict(vars(sync))
-
-    def interrupted(*arguments, **settings):
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(learning, "sums_in_portions", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            sync.fit(X[:3])
-    np.testing.assert_array_equal(sync.transform(X), expected)
-    for name in ("pattern_", "metric_", "exemplars_", "global_distances_", "lengths_"):
-        assert getattr(sync, name) is attributes[name]

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import LinearSynchronizer
-from sklearn_motionsync.metrics import keyframe_error
 
 
 def test_whole_keyframes_coincide_exactly():
@@ -64,59 +63,23 @@ def test_gaps_and_key_frames_together(bending, bending_aspace):
     np.testing.assert_array_equal(filled[~np.isnan(warped)], warped[~np.isnan(warped)])
 
 
-# -- bad key-frames -----------------------------------------------------------------------
-
-
-def test_transform_needs_keyframes_after_a_fit_with_them(bending):
-    sync = LinearSynchronizer().fit(bending.data, keyframes=bending.keyframes)
-    with pytest.raises(ValueError, match="give those of these trials too"):
-        sync.transform(bending.data)
-    with pytest.raises(ValueError, match="must be 5 increasing"):
-        sync.transform(bending.data, keyframes=bending.keyframes[:, :4])
-
-
-# -- what counts frames in another way ------------------------------------------------------
-
-
-def test_keyframes_in_seconds_are_refused():
-    """From where they do, tests/inputs/test_recorded.py tries."""
-    X = [np.arange(50.0)[:, None] ** 2, np.arange(300.0)[:, None]]
-    late, frames = [20, 25, 30], [0.62, 1.4, 2.5]
-    sync = LinearSynchronizer().fit(X[:1] * 2, keyframes=[late, late])
-    calls = [
-        lambda frames: LinearSynchronizer().fit(X, keyframes=[late, frames]),
-        lambda frames: sync.match(X, keyframes=[late, frames]),
-        lambda frames: sync.transform(X, keyframes=[late, frames]),
-        lambda frames: keyframe_error([range(50)] * 2, [late, frames], late, [50, 300]),
-    ]
-    for call in calls:
-        with pytest.raises(ValueError, match=r"Trial 1: .* look like seconds, .*_rate"):
-            call(frames)
-        # Whole frames.
-        call([1, 4, 5])
-
-
 def test_events_of_other_rows_are_no_keyframes():
+    """Which rows are others, tests/inputs/test_recorded.py tries."""
     rng = np.random.default_rng(0)
     takes = [pd.DataFrame({"knee": rng.normal(size=60).cumsum()}) for _ in range(3)]
     for x in takes:
         x.attrs["events"] = [{"label": "off", "frame": 30.5}]
-    keyframes = [[x.attrs["events"][0]["frame"]] for x in takes]
+    keyframes = [[30.5]] * 3
     sync = LinearSynchronizer().fit(takes, keyframes=keyframes)
-    for rows, words in (
-        (slice(10, None), "row 0 is frame 10"),
-        (slice(0, None, 2), "1 is frame 2"),
-    ):
-        X = [*takes[:2], takes[2].iloc[rows]]
-        for call in (LinearSynchronizer().fit, sync.match, sync.transform):
-            with pytest.raises(ValueError, match=f"Trial 2: .*{words} of the recording"):
-                call(X, keyframes=keyframes)
-            table = pd.concat(X, keys=range(3))
-            table.attrs = takes[0].attrs
-            with pytest.raises(ValueError, match=f"Trial 2: .*{words} of the recording"):
-                call(table, keyframes=keyframes)
-            call([x.reset_index(drop=True) for x in X], keyframes=[[30.5], [30.5], [20.5]])
-        # Without key-frames, or events to take them from, rows count.
-        LinearSynchronizer().fit(X)
-        X[2].attrs = {}
-        sync.match(X, keyframes=[[30.5], [30.5], [20.5]])
+    X = [*takes[:2], takes[2].iloc[10:]]
+    table = pd.concat(X, keys=range(3))
+    table.attrs = takes[0].attrs
+    for call in (LinearSynchronizer().fit, sync.match, sync.transform):
+        for given in (X, table):
+            with pytest.raises(ValueError, match=r"Trial 2: .*row 0 is frame 10 of the recording"):
+                call(given, keyframes=keyframes)
+        call([x.reset_index(drop=True) for x in X], keyframes=[[30.5], [30.5], [20.5]])
+    # Without key-frames, or events to take them from, rows count.
+    LinearSynchronizer().fit(X)
+    X[2].attrs = {}
+    sync.match(X, keyframes=[[30.5], [30.5], [20.5]])

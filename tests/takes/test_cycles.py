@@ -357,12 +357,6 @@ LEGS = ["pelvis", "neck", "left_knee", "left_ankle", "right_knee", "right_ankle"
             r"start='ahead' needs a skeleton .* hips or shoulders",
         ),
         *(
-            ({name: value}, f"The '{name}' parameter")
-            for name, value in (
-                ("threshold", 2), ("not_cyclic", "drop"), ("skeleton", "paper"), ("start", 1.5)
-            )
-        ),
-        *(
             ({"period": period}, "period must be two numbers of frames, the least")
             for period in ((40,), (60, 40), (1.9, 60), (2, np.nan), ("20", "60"))
         ),

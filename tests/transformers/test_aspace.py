@@ -66,12 +66,6 @@ def test_fit_refuses_too_few_poses_or_features(n_components, X, message):
         ASpace(n_components).fit(X)
 
 
-@pytest.mark.parametrize("n_components", [0, -1, 0.0, 1.5, "95%", None])
-def test_fit_refuses_invalid_n_components(n_components):
-    with pytest.raises(ValueError, match="'n_components' parameter"):
-        ASpace(n_components).fit([np.ones((4, 3))])
-
-
 def test_inverse_transform_refuses_wrong_width(poses):
     aspace = ASpace(2).fit(poses)
     with pytest.raises(ValueError, match="Trial 0 has 3 features a frame, but ASpace"):
