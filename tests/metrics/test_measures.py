@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from measure_cases import CASES, FIVE, WARPS, make_curves
-from sklearn_motionsync import metrics, to_frame
+from measure_cases import CASES, FIVE, integral, make_curves
+from sklearn_motionsync import metrics
 from sklearn_motionsync.metrics import (
+    amplitude_phase_variance,
     group_timing_error,
     keyframe_error,
     least_squares,
@@ -69,55 +70,45 @@ def test_group_timing_error_is_zero_for_true_warps_to_any_clock(bending):
 
 def test_closed_forms_of_warps():
     assert keyframe_error(FIVE, [[0, 8]], [0, 4], [9]) == 0
-    # Warps may decrease.
+    # Warps may decrease, and go beyond the bounds by rounding.
     assert keyframe_error([[0, 2, 1, 3, 4]], [[2]], [1], [9]) == pytest.approx(1)
+    assert keyframe_error([[-1e-15, 1, 2, 3, 4 + 1e-15]], [[5]], [2], [9]) == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("name", [n for n, case in CASES.items() if case.arguments[0] is WARPS])
-def test_warps_of_any_kind_give_the_same(name):
-    measure, others = getattr(metrics, name), CASES[name].arguments[1:]
-    times = np.rint(WARPS)
-    expected = measure(times, *others)
-    frozen = times.copy()
-    frozen.flags.writeable = False
-    kinds = [times.tolist(), pd.DataFrame(times), times.astype(object), times.astype("i4")]
-    for kind in [*kinds, times.astype("f4"), np.asfortranarray(times), np.ma.array(times), frozen]:
-        assert measure(kind, *others) == expected
-    # Rounding beyond the bounds is accepted.
-    times[:, [0, -1]] += [-1e-15, 1e-15]
-    assert measure(times, *others) == pytest.approx(expected, abs=1e-12)
+KINDS = {
+    "lists": lambda x: np.asarray(x).tolist(),
+    "tables": lambda x: pd.DataFrame(x) if np.ndim(x) == 2 else list(map(pd.DataFrame, x)),
+    "objects": lambda x: np.asarray(x).astype(object),
+    "masked": np.ma.array,
+}
 
 
-def test_moments_and_keyframes_of_any_kind_give_the_same():
-    times, moments = FIVE * 2, np.array([[0, 0.5, 1], [0, 0.7, 1]])
-    expected = group_timing_error(times, moments.tolist())
-    for kind in (moments, pd.DataFrame(moments), tuple(moments), iter(moments)):
-        assert group_timing_error(times, kind) == expected
-    objects = np.empty(2, dtype=object)
-    objects[:] = [np.array([5]), [5]]
-    for kind in ([[5], [5]], objects, pd.DataFrame([[5], [5]]), np.full((2, 1), 5, "i4")):
-        assert keyframe_error(times, kind, [2], [9, 9]) == pytest.approx(0.5)
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", CASES)
+def test_arguments_of_any_kind_give_the_same(name, kind):
+    """Also moments and key-frames."""
+    arguments, measure = CASES[name].arguments, getattr(metrics, name)
+    expected = measure(*arguments)
+    np.testing.assert_allclose(
+        measure(KINDS[kind](arguments[0]), *arguments[1:]), expected, rtol=1e-12
+    )
+    if name == "keyframe_error":
+        assert measure(arguments[0], KINDS[kind](arguments[1]), *arguments[2:]) == expected
+    if name == "group_timing_error":
+        assert measure(arguments[0], iter(arguments[1])) == expected
 
 
 # -- spread -------------------------------------------------------------------------------
 
 
-def test_spread_of_any_kind_of_input_and_in_any_unit():
-    x = make_curves().astype(np.float32)
-    y = x + (x.mean(axis=0) - x) / np.float32(2)
-    expected = least_squares(x, y)
-    objects = np.empty(len(x), dtype=object)
-    objects[:] = list(x)
-    frozen = x.astype(np.float64)
-    frozen.flags.writeable = False
-    frames = [pd.DataFrame(part) for part in x]
-    for kind in (x.tolist(), list(x), objects, frozen, frames, to_frame(x), np.asfortranarray(x)):
-        assert least_squares(kind, y) == pytest.approx(expected, rel=1e-12)
+@pytest.mark.parametrize("unit", [1e-9, 1e9])
+def test_spread_in_any_unit(unit):
+    x = make_curves()
+    y = x + (x.mean(axis=0) - x) / 2
+    assert least_squares(unit * x, unit * y) == pytest.approx(least_squares(x, y), rel=1e-12)
+    assert least_squares(x.astype("f4"), y.astype("f4")) == pytest.approx(0.25, rel=1e-5)
     integers = np.rint(x * 9).astype(int)
     assert least_squares(integers, integers) == pytest.approx(1)
-    for unit in (1e-9, 1e9):
-        found = least_squares(frozen * unit, y.astype(float) * unit)
-        assert found == pytest.approx(expected, rel=1e-12)
 
 
 CONSTANT = np.full((3, 20, 2), 0.1)
@@ -145,3 +136,73 @@ def test_least_squares_leaves_out_the_mean_of_the_others():
     """0.1, 0.2, 0.3: the second differs from the mean of the others by rounding."""
     x = np.array([0.1, 0.2, 0.3])[:, np.newaxis, np.newaxis] * np.ones((3, 5, 2))
     assert least_squares(x, x[[0, 0, 2]]) == pytest.approx((4 / 9 + 16 / 9) / 2)
+
+
+# -- the decomposition of Kneip and Ramsay ---------------------------------------------------
+
+
+T = np.linspace(0, 1, 2001)
+
+
+def warped(a):
+    """Curves s(h(t)) of one shape, h = t +- a sin(2 pi t) / 2 pi, whose mean is an even pace."""
+    h = [T + sign * a * np.sin(2 * np.pi * T) / (2 * np.pi) for sign in (-1, 1)]
+    return np.stack(h), np.stack([np.sin(np.pi * k) for k in h])[:, :, np.newaxis]
+
+
+def test_differences_of_timing_alone_are_phase_and_of_shape_alone_amplitude():
+    _, x = warped(0.5)
+    same = np.tile(np.sin(np.pi * T)[:, np.newaxis], (2, 1, 1))
+    found = amplitude_phase_variance(x, same)
+    assert found.amplitude == 0
+    assert found.phase_share == 1
+    heights = np.array([0.8, 1.0, 1.2])[:, np.newaxis, np.newaxis] * same[0]
+    found = amplitude_phase_variance(heights, heights)
+    np.testing.assert_allclose(found.phase, 0, atol=1e-15)
+    # The variance of the heights, times int sin^2 = 1 / 2.
+    np.testing.assert_allclose(found.amplitude, np.var([0.8, 1, 1.2]) / 2)
+    assert found.constant == 1
+
+
+def test_scaled_and_shifted_waves_have_their_closed_form():
+    """Heights c_i of a bump that a linear clock shifts: cos(2 pi (t - s_i)), whole periods."""
+    c, s = np.array([1.0, 1.5, 2.0, 0.5]), np.array([0.02, -0.05, 0.1, -0.07])
+    x = (c * np.cos(2 * np.pi * (T[:, np.newaxis] - s))).T[:, :, np.newaxis]
+    y = (c * np.cos(2 * np.pi * T[:, np.newaxis])).T[:, :, np.newaxis]
+    found = amplitude_phase_variance(x, y)
+    mean = np.abs(np.mean(c * np.exp(2j * np.pi * s)))
+    np.testing.assert_allclose(found.constant, 1)
+    np.testing.assert_allclose(found.amplitude, c.var() / 2)
+    np.testing.assert_allclose(found.phase, (c.mean() ** 2 - mean**2) / 2)
+    np.testing.assert_allclose(found.total, (np.mean(c**2) - mean**2) / 2)
+
+
+def test_constant_equals_the_formula_of_the_paper():
+    """1 + sum cov(h', y^2) / sum int y^2, where the mean of the warps is an even pace."""
+    inverse, _ = warped(0.6)
+    heights = np.array([1.0, 2.0])
+    # y_i(t) = x_i(h_i(t)), so that h_i is the inverse of what warps the shape.
+    y = heights[:, np.newaxis] * (1 + np.sin(np.pi * T)) * np.linspace(1, 2, len(T))
+    h = inverse
+    x = np.stack([np.interp(T, a, b) for a, b in zip(h, y, strict=True)])
+    rates = np.gradient(h, T, axis=1, edge_order=2)
+    np.testing.assert_allclose(rates.mean(axis=0), 1)
+    covariance = sum(
+        integral((rate - 1) * (of_one - (y**2).mean(axis=0)))
+        for rate, of_one in zip(rates, y**2, strict=True)
+    )
+    expected = 1 + covariance / sum(integral(of_one) for of_one in y**2)
+    assert abs(expected - 1) > 0.01
+    found = amplitude_phase_variance(x[:, :, np.newaxis], y[:, :, np.newaxis])
+    np.testing.assert_allclose(found.constant, expected, rtol=1e-5)
+
+
+def test_decomposition_of_identical_trials():
+    same = np.ones((3, 9, 2))
+    for x in (same, 0 * same):
+        found = amplitude_phase_variance(x, x)
+        assert (*found[:3], found.constant) == (0, 0, 0, 1)
+        assert np.isnan(found.phase_share)
+    for pair in ((same, 0 * same), (0 * same, same)):
+        with pytest.raises(ValueError, match="zero everywhere, and the other is not"):
+            amplitude_phase_variance(*pair)

@@ -144,3 +144,26 @@ def test_max_rate_beyond_the_clip_changes_nothing(warps):
     most = DenseSynchronizer(P, max_rate=P - 1).fit(warps)
     beyond = DenseSynchronizer(P, max_rate=1e6).fit(warps)
     np.testing.assert_array_equal(beyond.match(warps).times, most.match(warps).times)
+
+
+# -- small sets -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("n_features", [1, 2])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_few_trials(n, n_features, dtype, warps):
+    X = [x[:, :n_features].astype(dtype) for x in warps[:n]]
+    sync = DenseSynchronizer().fit(X)
+    assert (sync.metric_ is None) == (n < 3)
+    assert sync.evidence_.weak is False
+    assert sync.global_distances_.shape == (n,)
+    assert len(sync.exemplars_) == n - 1
+    assert np.isnan(sync.unexplained_variance_) == (n == 1)
+    times, aligned = sync.match(X).times, sync.transform(X)
+    np.testing.assert_array_equal(times[sync.pattern_index_], np.arange(sync.n_frames_))
+    assert (np.diff(times, axis=1) >= 0).all()
+    assert sync.pattern_.dtype == aligned.dtype == dtype
+    before = LinearSynchronizer(pattern=sync.pattern_index_).fit_transform(X)
+    off, linear = (np.abs(x - sync.pattern_).mean() for x in (aligned, before))
+    assert off <= linear
