@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, FrameWise, Skeleton
-from sklearn_motionsync.datasets import load_trials
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, FrameWise
 from sklearn_motionsync.synchronizers import training
 
 SETTINGS = [
@@ -66,12 +65,10 @@ def test_warning_does_not_depend_on_batches(monkeypatch):
         DenseSynchronizer(n_frames=30, metric=None).fit(walks())
 
 
-@pytest.mark.parametrize("name", ["hdm05", "utkinect"])
-def test_no_warning_for_recordings_and_principal_components(name, real_data):
-    bunch = load_trials(real_data / name / f"{name}_positions.npz")
-    skeleton = Skeleton.acclaim() if name == "hdm05" else Skeleton.kinect()
-    label = {"hdm05": "depositFloorR", "utkinect": "standUp"}.get(name, bunch.target[0])
-    X = [x for x, target in zip(bunch.data, bunch.target, strict=True) if target == label][:12]
-    cosines = DirectionCosines(skeleton).fit_transform(X)
+@pytest.mark.parametrize(("name", "label"), [("hdm05", "depositFloorR"), ("utkinect", "standUp")])
+def test_no_warning_for_recordings_and_principal_components(name, label, request):
+    bunch = request.getfixturevalue(name)
+    X = [bunch.data[i] for i in np.flatnonzero(bunch.target == label)[:12]]
+    cosines = DirectionCosines(bunch.skeleton).fit_transform(X)
     for features in (X, cosines, ASpace().fit_transform(cosines), ASpace(2).fit_transform(X)):
         assert is_quiet(features)

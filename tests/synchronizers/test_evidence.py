@@ -16,14 +16,6 @@ from sklearn_motionsync.synchronizers.learning import weigh_evidence
 P = 60
 
 
-def one_movement(n, noise=0.02):
-    """Warped copies of two curves, with noise."""
-    rng, t = np.random.default_rng(0), np.linspace(0, 1, P)
-    phases = [t + b * np.sin(np.pi * t) for b in rng.uniform(-0.15, 0.15, n)]
-    curves = [np.column_stack([np.sin(7 * p), np.cos(5 * p)]) for p in phases]
-    return [x + noise * rng.standard_normal(x.shape) for x in curves]
-
-
 def chance(n):
     return list(np.random.default_rng(0).standard_normal((n, P, 3)))
 
@@ -37,16 +29,6 @@ def test_warps_of_noise_are_warned_of():
     assert sync.evidence_.remaining > 0.7
     assert sync.evidence_.inconsistency > 0.7
     assert not sync.refines_
-
-
-@pytest.mark.parametrize("X", [one_movement(12), chance(9)], ids=["one movement", "too few"])
-def test_others_are_warped_without_a_warning(X):
-    sync = DenseSynchronizer(P).fit(X)
-    assert not sync.evidence_.weak
-    assert np.abs(sync.match(X).offsets).max() > 3
-    if len(X) == 12:
-        assert sync.evidence_.inconsistency < 0.3
-        assert sync.evidence_.remaining < 0.3
 
 
 @pytest.mark.parametrize(

@@ -89,22 +89,20 @@ def test_tables_tell_their_frame_rate():
         match = LinearSynchronizer(20).fit(X).match(X)
     lengths = list(map(len, X))
     expected = match.to_frame("seconds", lengths, rates)
-    pd.testing.assert_frame_equal(match.to_frame("seconds", X), expected)
     # It knows its trials; what was recorded with them, by frames of any rate, lasts as long.
-    pd.testing.assert_frame_equal(match.to_frame("seconds"), expected)
+    for given in ((), (X,)):
+        pd.testing.assert_frame_equal(match.to_frame("seconds", *given), expected)
+        offsets = match.offsets_in("seconds", *given).ravel()
+        np.testing.assert_array_equal(offsets, expected["offset"])
     forces = [np.zeros((10 * n - 9, 1)) for n in lengths]
     np.testing.assert_allclose(match.seconds(forces), match.seconds(), rtol=1e-12)
-    np.testing.assert_array_equal(match.frames(), match.frames(X))
     # One that is given counts.
     given = match.to_frame("seconds", lengths, 10)
     pd.testing.assert_frame_equal(match.to_frame("seconds", X, 10), given)
-    np.testing.assert_allclose(match.seconds(X)[:3, -1], [0.58, 0.78, 0.98])
-    offsets = match.offsets_in("seconds", lengths, rates)
-    np.testing.assert_array_equal(match.offsets_in("seconds", X), offsets)
     long = to_frame(X[:3])
     np.testing.assert_allclose(Match(match.times[:3]).seconds(long)[:, -1], [0.58, 0.78, 0.98])
+    of_warps = Match(match.times)
     for unknown in ([*X[:4], X[0].to_numpy()], [*X[:4], recorded.drop(index=5)], lengths):
-        of_warps = Match(match.times)
         for call in (of_warps.seconds, partial(of_warps.to_frame, "seconds")):
             with pytest.raises(ValueError, match=r"The frame rate of trial \d is not known"):
                 call(unknown)
@@ -230,27 +228,24 @@ def test_rates_are_the_slope_of_the_warp(late):
 def test_to_frame_gives_timing_with_labels(late):
     X = to_frame([np.zeros((21, 1)), np.zeros((41, 1))], trials=["ann", "bob"])
     table = late.to_frame("seconds", X, frame_rate=[10, 40])
-    assert table.index.names == ["trial", "frame"]
-    assert list(table.index.unique(0)) == ["ann", "bob"]
     assert list(table.columns) == ["time", "offset", "rate"]
     np.testing.assert_allclose(table.loc[("bob", 5)], [0.4, -0.1, 1])
     named = late.to_frame(X=X.rename_axis(["trial", "sample"]))
-    assert named.index.names == ["trial", "frame"]
+    assert named.index.names == table.index.names == ["trial", "frame"]
     table = late.to_frame()
     np.testing.assert_array_equal(table["offset"].unstack(), late.offsets)
     np.testing.assert_array_equal(table["time"].unstack(), late.times)
     np.testing.assert_array_equal(table["rate"].unstack(), late.rates)
-    assert list(late.to_frame("percent", labels=pd.Series(["x", "y"])).index.unique(0)) == [
-        "x",
-        "y",
-    ]
-    assert list(late.to_frame(X=X, labels=["x", "y"]).index.unique(0)) == ["x", "y"]
-    assert list(late.to_frame(X=[21, 41]).index.unique(0)) == [0, 1]
     lengths = pd.Series({("ann", 1): 21, ("ann", 2): 41}).rename_axis(["subject", "trial"])
     assert late.to_frame("seconds", lengths, 10).index.names == ["subject", "trial", "frame"]
-    for index in ([0, 1], [3, 3]):
-        unnamed = pd.Series([21, 41], index=index)
-        assert list(late.to_frame("seconds", unnamed, 10).index.unique(0)) == [0, 1]
+    for given, labels in (
+        ({"X": X}, ["ann", "bob"]),
+        ({"labels": pd.Series(["x", "y"])}, ["x", "y"]),
+        ({"X": X, "labels": ["x", "y"]}, ["x", "y"]),
+        ({"X": [21, 41]}, [0, 1]),
+        ({"X": pd.Series([21, 41], index=[3, 3])}, [0, 1]),
+    ):
+        assert list(late.to_frame("percent", **given).index.unique(0)) == labels
 
 
 # -- the table that notebooks show ---------------------------------------------------------

@@ -74,15 +74,6 @@ def test_no_metric_equals_metric_none(settings, n, trials):
     np.testing.assert_array_equal(sync.match(X).distances, plain.match(X).distances)
 
 
-def test_one_feature_gives_a_metric(trials):
-    X = [x[:, :1] for x in trials[0]]
-    sync = DenseSynchronizer(60, pattern=0).fit(X)
-    np.testing.assert_array_equal(sync.metric_.share, [1])
-    truth = [60 * (np.interp(trials[1][0], p, np.linspace(0, 1, 60))) for p in trials[1]]
-    errors = np.abs(sync.match(X).times / 59 * 60 - truth)
-    assert errors[1:].mean() < 0.5 * np.abs(np.arange(60) / 59 * 60 - truth)[1:].mean()
-
-
 def test_metric_of_many_is_learnt_from_twenty(trials):
     X = [x for x in trials[0] for _ in range(5)]
     rng = np.random.default_rng(0)

@@ -18,12 +18,7 @@ from sklearn_motionsync import (
     TimingChannel,
 )
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.display import (
-    ActionModelDisplay,
-    SkeletonDisplay,
-    SynchronizationDisplay,
-    TrellisDisplay,
-)
+from sklearn_motionsync.display import ActionModelDisplay, SkeletonDisplay
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 from sklearn_motionsync.model import find_departures
 
@@ -102,7 +97,6 @@ def test_keyframes_are_routed_by_name_and_by_request(bunch):
     np.testing.assert_array_equal(Match.from_estimator(channel, X, **given).times, expected.times)
     with pytest.raises(TypeError, match="got 'moments', which is no argument"):
         Match.from_estimator(channel, X, moments=[1])
-    assert SpreadScorer()(channel, X, **given) == SpreadScorer()(channel.synchronizer_, X, **given)
     with config_context(enable_metadata_routing=True):
         asking = LinearSynchronizer(30).set_fit_request(keyframes=True)
         asking.set_transform_request(keyframes=True)
@@ -118,20 +112,14 @@ def test_keyframes_are_routed_by_name_and_by_request(bunch):
             TimingChannel(asking).fit_transform(X, moments=[1])
 
 
-def test_scorers_and_displays_find_the_synchronizer(bunch, pipes):
+def test_scorers_and_detectors_find_the_synchronizer(bunch, pipes):
     (pipe, plain), X = pipes, bunch.data
-    np.testing.assert_array_equal(
-        Match.from_estimator(pipe, X).times, Match.from_estimator(plain, X).times
-    )
+    times = [Match.from_estimator(each, X).times for each in pipes]
+    np.testing.assert_array_equal(*times)
     for scorer in (SpreadScorer(), FeatureHoldoutScorer()):
         assert scorer(pipe, X) == scorer(plain, X)
-    one, other = (SynchronizationDisplay.from_estimator(p, X) for p in (pipe, plain))
-    np.testing.assert_array_equal(one.after, other.after)
-    one, other = (TrellisDisplay.from_estimator(p, X, trial=1) for p in (pipe, plain))
-    np.testing.assert_array_equal(one.space.costs, other.space.costs)
     assert len(SkeletonDisplay.from_model(pipe, frames=[5]).axes_) == 2
-    detector = ActionDetector(pipe).fit(X)
-    assert (detector.predict(X) == 1).all()
+    assert (ActionDetector(pipe).fit(X).predict(X) == 1).all()
 
 
 def test_model_displays_show_the_channel_beside_poses(bunch, pipes):
@@ -186,25 +174,9 @@ def test_fit_refuses_a_feature_with_the_name_of_the_channel(points):
 # -- standard errors of the offset -----------------------------------------------------------
 
 
-def test_errors_are_zero_where_a_warp_is_pinned(points):
-    lows = np.array([[x[:, 0].argmax()] for x in points])
-    channel = TimingChannel(DenseSynchronizer(30, pattern=2), errors=True)
-    channel.fit(points, keyframes=lows)
-    errors = channel.transform(points, keyframes=lows)[:, :, -1]
-    pinned = [0, 29, *np.floor(channel.synchronizer_.keyframes_).astype(int)]
-    np.testing.assert_allclose(errors[:, pinned], 0, atol=1e-9)
-    others = np.delete(errors, [0, 1, 28, 29, pinned[2] - 1, pinned[2], pinned[2] + 1], axis=1)
-    assert (np.delete(others, 2, axis=0) > 0).all()
-    # The pattern itself.
-    assert others[2].max() < 0.05 * np.median(others)
-
-
 def test_errors_that_are_not_known_are_refused_in_fit(points):
     channel = TimingChannel(LinearSynchronizer(), errors=True)
-    message = (
-        "errors=True needs DenseSynchronizer or PartSynchronizer, .*; got Linear.*errors=False"
-    )
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=r"errors=True needs .*; got Linear.*errors=False"):
         channel.fit(points)
     assert not hasattr(channel, "synchronizer_")
 

@@ -68,10 +68,3 @@ def test_trials_are_labelled_by_their_take():
     assert parts[0].attrs["trial"] == ("bob", 1, 1)
     assert to_frame(parts).index.names == ["subject", "trial", "part", "frame"]
     assert locations["take"].tolist() == [("bob", 1), ("ann", 1), ("bob", 1)]
-
-
-def test_no_rows_give_no_trials():
-    takes = check_input(LinearSynchronizer(), TAKES, reset=True, level="sequence")
-    parts, locations = cut_takes(TAKES, takes, ROWS[:0])
-    assert parts == []
-    assert list(locations.columns) == list(ROWS.columns)

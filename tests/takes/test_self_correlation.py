@@ -60,12 +60,9 @@ def test_unit_offset_and_precision_do_not_change_the_period():
         assert found.strength == pytest.approx(expected.strength, rel=1e-4)
 
 
-def test_noise_is_not_cyclic_and_hides_no_cycle():
-    x, noise = waves(400, 80), np.random.default_rng(1).normal(size=(400, 4))
+def test_noise_is_not_cyclic():
+    noise = np.random.default_rng(1).normal(size=(400, 4))
     assert self_correlation(noise).strength < 0.3
-    found = self_correlation(x + 0.3 * x.std() * noise)
-    assert found.period == pytest.approx(80, rel=0.03)
-    assert found.strength > 0.6
     drift = gaussian_filter1d(np.random.default_rng(2).normal(size=(400, 4)), 60, axis=0)
     assert self_correlation(drift / drift.std() + 0.05 * noise).strength < 0.3
 
@@ -77,10 +74,12 @@ def test_strength_is_robust_to_white_noise(size, lost):
     x = waves(320, 80)
     x = x / x.std() + 0.8 * path / path.std()
     expected = self_correlation(x)
-    found = self_correlation(x + size * x.std() * rng.normal(size=x.shape))
+    noisy = x + size * x.std() * rng.normal(size=x.shape)
+    found = self_correlation(noisy)
     assert 0.6 < expected.strength < 0.8
     assert found.strength == pytest.approx(expected.strength, abs=lost)
     assert found.period == pytest.approx(expected.period, rel=0.02)
+    assert rejection_reason(correlate(noisy), 0.4) == ""
 
 
 def test_peaks_are_positive_maxima_after_a_fall():
@@ -153,13 +152,6 @@ def test_still_or_very_short_takes_have_no_period(n_frames):
 def test_refuses_other_than_one_take(take, message):
     with pytest.raises(ValueError, match=message):
         self_correlation(take)
-
-
-def test_a_wave_under_noise_is_not_rejected():
-    rng = np.random.default_rng(0)
-    t = 2 * np.pi * np.arange(300)[:, np.newaxis] / 90
-    one = np.sin(t) + 0.3 * rng.standard_normal(t.shape)
-    assert rejection_reason(correlate(one), 0.4) == ""
 
 
 def test_breadth_is_the_effective_number_of_dimensions():
