@@ -6,12 +6,7 @@ import pytest
 from sklearn_motionsync.matching import tile as module
 from sklearn_motionsync.matching.anchors import KeyframeColumns, add_ramps
 from sklearn_motionsync.matching.costs import COSTS, step_table
-from sklearn_motionsync.matching.gaps import (
-    SHRINKAGE,
-    Filler,
-    interpolate_gaps,
-    moments_of_seen,
-)
+from sklearn_motionsync.matching.gaps import SHRINKAGE, Filler, interpolate_gaps, moments_of_seen
 from sklearn_motionsync.matching.trellis import Trellis
 
 from oracle import known_paths, step_costs

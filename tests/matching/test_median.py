@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
 from sklearn_motionsync.matching import median as of_median
-from sklearn_motionsync.matching.median import (
-    MOST_REFERENCES,
-    draw_references,
-    median_of_sums,
-)
+from sklearn_motionsync.matching.median import MOST_REFERENCES, draw_references, median_of_sums
 
 from made_people import made_people
 

@@ -24,6 +24,7 @@ SYNCHRONIZERS = {
     "parts": PartSynchronizer({"one": [0, 1, 2], "two": [5, 6]}, synchronizer=DENSE),
     "timing": TimingChannel(DENSE),
     "linear": LinearSynchronizer(P),
+    "sample": DenseSynchronizer(P, max_fit=5),
 }
 WHOLE = [x[:, 6:18] for x in make_bending(8, random_state=0).data]
 
@@ -184,13 +185,14 @@ def confidences(trials):
     return [np.isfinite(x).astype(float) for x in trials]
 
 
-@pytest.mark.parametrize("name", ["dense", "linear", "parts"])
+@pytest.mark.parametrize("name", ["dense", "linear", "parts", "sample", "timing"])
 def test_no_confidence_is_as_nan(name):
     sync, given = clone(SYNCHRONIZERS[name]), {"confidence": confidences(GAPPY)}
     expected = clone(sync).fit(GAPPY)
-    wrong = [np.where(np.isnan(x), 100.0, x) for x in GAPPY]
+    wrong = [np.where(np.isnan(x) & (name != "timing"), 100.0, x) for x in GAPPY]
     fitted = clone(sync).fit(wrong, **given)
-    np.testing.assert_array_equal(fitted.pattern_, expected.pattern_)
+    patterns = [getattr(each, "synchronizer_", each).pattern_ for each in (fitted, expected)]
+    np.testing.assert_array_equal(*patterns)
     found = fitted.match(wrong, **given)
     np.testing.assert_array_equal(found.times, expected.match(GAPPY).times)
     np.testing.assert_array_equal(found.distances, expected.match(GAPPY).distances)
@@ -233,16 +235,6 @@ def test_confidence_goes_through_pipelines_and_searches():
     plain = cross_validate(DENSE, GAPPY, cv=2, scoring=SpreadScorer())
     assert np.isfinite(found["test_score"]).all()
     assert np.abs(found["test_score"] - plain["test_score"]).max() < 0.2
-
-
-def test_confidence_of_a_sample_and_of_timing():
-    sure = confidences(GAPPY)
-    sync = DenseSynchronizer(P, max_fit=5).fit(GAPPY, confidence=sure)
-    expected = DenseSynchronizer(P, max_fit=5).fit(GAPPY)
-    np.testing.assert_array_equal(sync.pattern_, expected.pattern_)
-    timing = TimingChannel(DENSE).fit(GAPPY, confidence=sure)
-    found = timing.transform(GAPPY, confidence=sure)
-    np.testing.assert_array_equal(found, TimingChannel(DENSE).fit(GAPPY).transform(GAPPY))
 
 
 WRONG = {

@@ -7,11 +7,7 @@ from sklearn import config_context
 from sklearn.base import clone
 from sklearn.model_selection import KFold, cross_val_score
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    FrameWise,
-    LinearSynchronizer,
-)
+from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 

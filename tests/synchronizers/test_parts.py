@@ -5,12 +5,7 @@ import pandas as pd
 import pytest
 from scipy.stats import f_oneway, ttest_1samp
 from sklearn import clone
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    DirectionCosines,
-    PartSynchronizer,
-    Skeleton,
-)
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, PartSynchronizer, Skeleton
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.synchronizers import Lags
 
