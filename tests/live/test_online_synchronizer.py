@@ -298,17 +298,24 @@ def test_constant_and_equal_training_trials():
     x, _ = trial(40)
     constant = OnlineSynchronizer(LinearSynchronizer()).fit([np.ones((40, 3))] * 2)
     assert all(np.isfinite(found).all() for found in constant.track([x, np.ones((40, 3))]))
-    # Another movement is as unlike them in any unit.
-    other, confidences = trial(40, 0.4)[0][::-1], []
+    equal = OnlineSynchronizer(LinearSynchronizer()).fit([x] * 3)
+    found, unlike = equal.track([x, trial(40, 0.4)[0][::-1]])
+    np.testing.assert_array_equal(found.phase, np.arange(40))
+    assert found.confidence.min() > 0.9
+    assert np.median(found.upper - found.lower) <= 2.1
+    assert unlike.confidence[20:].max() < 0.1
+
+
+@pytest.mark.parametrize("bends", [(0.3,), (-0.2, 0.0, 0.3), (0.0, 0.0, 0.0)])
+def test_confidences_and_intervals_do_not_depend_on_the_unit(bends):
+    told = []
     for unit in (1, 2.0**-20):
-        equal = OnlineSynchronizer(LinearSynchronizer()).fit([x * unit] * 3)
-        found, unlike = equal.track([x * unit, other * unit])
-        np.testing.assert_array_equal(found.phase, np.arange(40))
-        assert found.confidence.min() > 0.9
-        assert np.median(found.upper - found.lower) <= 2.1
-        confidences.append(unlike.confidence)
-    np.testing.assert_allclose(*confidences, rtol=1e-6, atol=1e-9)
-    assert confidences[0][20:].max() < 0.1
+        X = [unit * trial(40 + 5 * i, bend)[0] for i, bend in enumerate(bends)]
+        live = OnlineSynchronizer(LinearSynchronizer()).fit(X)
+        told.append(np.concatenate(live.track([unit * trial(45, 0.1)[0], X[0][::-1]]), axis=1))
+    np.testing.assert_allclose(*told, rtol=1e-6, atol=1e-6)
+    phase, lower, upper = told[0][[0, 3, 4]]
+    assert ((lower >= 0) & (lower <= phase) & (phase <= upper)).all()
 
 
 def test_calibration_equals_streams_matched_to_the_mean_of_the_others():

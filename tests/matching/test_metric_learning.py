@@ -187,9 +187,6 @@ def test_feature_that_agrees_once_matched_is_used():
     assert metric_of_matches(fixed_match(times), x, velocity)[0].features.tolist() == [0, 1]
 
 
-# -- what warps tell of themselves --------------------------------------------------------
-
-
 def circle(times):
     """Of warps of all ordered pairs, those to the next ones in a circle."""
     n = len(times)

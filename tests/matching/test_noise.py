@@ -18,9 +18,6 @@ def curves(n, noise=0.0, n_features=1, seed=0):
     return clean + noise * rng.standard_normal(clean.shape)
 
 
-# -- its variance ---------------------------------------------------------------------------
-
-
 def test_white_noise_equals_explicit_differences():
     rng = np.random.default_rng(0)
     arrays = [rng.standard_normal((length, 2)) for length in (6, 7, 20, 3)]
@@ -31,9 +28,6 @@ def test_white_noise_equals_explicit_differences():
         expected += np.square(differences).mean(axis=0) / 924 / 2
     np.testing.assert_allclose(white_noise(arrays), expected)
     assert np.isnan(white_noise([arrays[0], arrays[3]])).all()
-
-
-# -- the width that smooths it --------------------------------------------------------------
 
 
 def test_width_equals_its_closed_form():

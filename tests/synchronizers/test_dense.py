@@ -25,9 +25,6 @@ def warps():
     return [warped(n, power) for n, power in ((60, 1.0), (80, 1.2), (50, 0.85), (70, 1.1))]
 
 
-# -- the clock --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("estimator", BOTH)
 def test_clock_is_given_or_the_median_length(estimator, warps):
     sync = estimator().fit(warps)
@@ -35,9 +32,6 @@ def test_clock_is_given_or_the_median_length(estimator, warps):
     for n_frames in (None, 30, 2):
         shape = estimator(n_frames=n_frames).fit_transform(warps).shape
         assert shape == (4, n_frames or 65, 3)
-
-
-# -- the pattern ------------------------------------------------------------------------
 
 
 def test_linear_median_is_the_smallest_sum_of_distances(warps):
@@ -60,9 +54,6 @@ def test_pattern_by_index_or_array(estimator, warps):
     np.testing.assert_allclose(by_array.transform(warps), by_index.transform(warps), atol=0.02)
     by_list = estimator(pattern=by_index.pattern_.tolist(), n_frames=20).fit(warps)
     assert by_list.pattern_.shape == (20, 3)
-
-
-# -- the warp ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("max_offset", [0.1, 1])
@@ -144,9 +135,6 @@ def test_max_rate_beyond_the_clip_changes_nothing(warps):
     most = DenseSynchronizer(P, max_rate=P - 1).fit(warps)
     beyond = DenseSynchronizer(P, max_rate=1e6).fit(warps)
     np.testing.assert_array_equal(beyond.match(warps).times, most.match(warps).times)
-
-
-# -- small sets -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

@@ -15,9 +15,6 @@ def error(X, truth, **params):
     return np.abs(sync.match(X).times - truth)[1:].mean()
 
 
-# -- copies of one source -------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("noise", "n_features", "most"),
     [
@@ -41,9 +38,6 @@ def test_copies_of_one_source_are_refined(n_features, noise, most, known_warps):
         assert errors[-1] == error(X, truth, refine=True)
         assert errors[-1] < 0.85 * error(X, truth, refine=False)
     assert np.mean(errors) < most
-
-
-# -- the number -----------------------------------------------------------------------------
 
 
 def test_number_equals_its_formula(known_warps):

@@ -168,9 +168,6 @@ def test_fit_refuses_a_feature_with_the_name_of_the_channel(points):
         TimingChannel(LinearSynchronizer()).fit(frames)
 
 
-# -- standard errors of the offset -----------------------------------------------------------
-
-
 def test_errors_that_are_not_known_are_refused_in_fit(points):
     channel = TimingChannel(LinearSynchronizer(), errors=True)
     with pytest.raises(ValueError, match=r"errors=True needs .*; got Linear.*errors=False"):

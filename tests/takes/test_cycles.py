@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn import clone
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import estimator_checks
 from sklearn_motionsync import (
@@ -424,14 +423,6 @@ def test_a_single_take_is_a_list_of_one(gait, fitted):
         alone = fitted.segment([gait.data[i]])[1]
         among = whole[whole["take"] == i].assign(take=0).reset_index(drop=True)
         pd.testing.assert_frame_equal(alone, among)
-
-
-def test_float32_is_cut_at_the_same_frames(gait, fitted):
-    expected = fitted.segment(gait.data[3:])
-    single = [x.astype(np.float32) for x in gait.data]
-    cycles, locations = clone(fitted).fit(single[:3]).segment(single[3:])
-    assert all(c.dtype == np.float32 for c in cycles)
-    assert (locations["start"] - expected[1]["start"]).abs().max() <= 1
 
 
 def test_a_feature_that_counts_the_time_is_warned_of():

@@ -124,9 +124,6 @@ def conditional(x, mean, covariance):
     return x, left
 
 
-# -- the moments --------------------------------------------------------------------------
-
-
 def test_components_are_those_of_the_covariance_of_what_was_seen():
     """Every covariance is that of the poses that show both features, by pandas."""
     X = hide(low_rank(3, n_features=5, noise=0.3), 0.2)
@@ -157,9 +154,6 @@ def test_without_gaps_nothing_is_estimated_otherwise(monkeypatch):
     np.testing.assert_array_equal(aspace.missing_, np.zeros(6))
     for x, points in zip(X, aspace.transform(X), strict=True):
         np.testing.assert_array_equal(points, (x - pca.mean_) @ aspace.components_.T)
-
-
-# -- hidden values ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("fitted_on", ["whole", "gaps"])
@@ -194,9 +188,6 @@ def test_correlation_time_is_where_the_autocorrelation_falls_to_one_over_e():
     assert 10 < time_of(X) < 14
     assert 10 < time_of(hide(X, 0.2)) < 14
     assert time_of([rng.standard_normal((99, 3))]) < 1
-
-
-# -- people -------------------------------------------------------------------------------
 
 
 def test_a_limb_of_people_that_is_hidden_for_a_second(bends):
@@ -275,9 +266,6 @@ def test_constant_features_and_few_poses(n):
     assert all(np.isfinite(x).all() for x in back)
     still = ASpace().fit([np.array([[1.0, np.nan], [1, 2], [1, 2]])])
     np.testing.assert_allclose(still.transform([np.array([[np.nan, 2.0], [1, 2]])])[0], 0)
-
-
-# -- input and output ---------------------------------------------------------------------
 
 
 def test_nan_points_become_nan_poses():
