@@ -100,8 +100,8 @@ def test_paths_of_long_trials_take_little_memory():
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 @pytest.mark.parametrize("settings", [{}, {"pattern": 3}, PAPER])
 def test_portions_change_nothing(monkeypatch, settings):
-    X = walks(26, 20, dtype=np.float32)
-    monkeypatch.setattr(median, "MOST_REFERENCES", 20)
+    X = walks(16, 20, dtype=np.float32)
+    monkeypatch.setattr(median, "MOST_REFERENCES", 12)
     expected = DenseSynchronizer(**settings).fit(X)
     monkeypatch.setattr(learning, "PORTION_CELLS", 5_000)
     sync = DenseSynchronizer(**settings).fit(X)

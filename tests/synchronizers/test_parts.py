@@ -196,10 +196,7 @@ def test_other_features_have_no_parts():
         ({"arm": []}, "Part 'arm': features must name at least one"),
         ({"arm": None}, "Part 'arm': features must name at least one"),
         ({"arm": [1, 2], "leg": [2]}, "Feature 'x2' is in part 'arm' and again in 'leg'"),
-        (
-            {"rest": [1]},
-            "The name of a part must be a string other than 'rest'; got 'rest'",
-        ),
+        ({"rest": [1]}, "name of a part must be a string other than 'rest'; got 'rest'"),
         ({1: [1]}, "The name of a part must be a string"),
         ([1], "The 'parts' parameter of PartSynchronizer"),
     ],
