@@ -109,6 +109,9 @@ def test_spread_in_any_unit(unit):
     assert least_squares(x.astype("f4"), y.astype("f4")) == pytest.approx(0.25, rel=1e-5)
     integers = np.rint(x * 9).astype(int)
     assert least_squares(integers, integers) == pytest.approx(1)
+    one, other = (amplitude_phase_variance(size * x, size * y) for size in (1, unit))
+    np.testing.assert_allclose(other[:3], np.array(one[:3]) * unit**2)
+    np.testing.assert_allclose(other[3:], one[3:])
 
 
 CONSTANT = np.full((3, 20, 2), 0.1)
