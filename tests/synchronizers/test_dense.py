@@ -155,3 +155,18 @@ def test_few_trials(n, n_features, dtype, warps):
     before = LinearSynchronizer(pattern=sync.pattern_index_).fit_transform(X)
     off, linear = (np.abs(x - sync.pattern_).mean() for x in (aligned, before))
     assert off <= linear
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_constant_signals_count_for_nothing(dtype, warps):
+    """Those that are no multiples of powers of two have roundings of their own."""
+    X = [x.astype(dtype) for x in warps]
+    still = [np.concatenate([x, np.full((len(x), 2), [0.1, -3], dtype)], axis=1) for x in X]
+    sync, plain = DenseSynchronizer().fit(still), DenseSynchronizer().fit(X)
+    assert sync.pattern_index_ == plain.pattern_index_
+    np.testing.assert_array_equal(sync.metric_.share[3:], 0)
+    np.testing.assert_allclose(sync.match(still).times, plain.match(X).times, atol=0.1)
+    nothing = [x[:, 3:] for x in still]
+    sync = DenseSynchronizer().fit(nothing)
+    assert not sync.match(nothing).offsets.any()
+    assert not sync.refines_
