@@ -9,13 +9,7 @@ from sklearn.base import clone
 from sklearn.exceptions import UnsetMetadataPassedError
 from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ActionModel,
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    LinearSynchronizer,
-)
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import (
     FeatureHoldoutScorer,
@@ -43,10 +37,6 @@ def points(bunch):
 def routing():
     with config_context(enable_metadata_routing=True):
         yield
-
-
-def requesting(scorer):
-    return scorer().set_score_request(keyframes=True)
 
 
 def requesting_sync():
@@ -99,11 +89,6 @@ def test_holdout_score_has_no_unit_and_hardly_depends_on_frames(points):
 
     assert score(90, 1) == pytest.approx(score(30, 1), rel=0.1)
     assert score(30, 1000) == pytest.approx(score(30, 1))
-
-
-def test_scorer_refuses_estimator_without_synchronizer(bending_aspace):
-    with pytest.raises(ValueError, match="no synchronizer in ASpace"):
-        SpreadScorer()(ASpace(2).fit(bending_aspace), bending_aspace)
 
 
 # -- key-frames given as arguments --------------------------------------------------------
@@ -194,24 +179,6 @@ def test_metadata_may_have_any_name(scorer, bunch, points):
 
 
 # -- key-frames routed by scikit-learn ----------------------------------------------------
-
-
-@pytest.mark.usefixtures("routing")
-@pytest.mark.parametrize(
-    ("scorer", "ends_in_model"), [(SpreadScorer, False), (FeatureHoldoutScorer, True)]
-)
-def test_grid_search_with_key_frames_in_a_pipeline(scorer, ends_in_model, bunch):
-    steps = [DirectionCosines(bunch.skeleton), ASpace(4), requesting_sync()]
-    pipe = make_pipeline(*steps, *([ActionModel()] if ends_in_model else []))
-    grid = {"aspace__n_components": [3, 5]}
-    search = GridSearchCV(pipe, grid, cv=2, scoring=requesting(scorer), error_score="raise")
-    search.fit(bunch.data, keyframes=list(bunch.keyframes))
-    assert np.isfinite(search.cv_results_["mean_test_score"]).all()
-    score = search.score(bunch.data, keyframes=bunch.keyframes)
-    assert score == scorer()(search, bunch.data, keyframes=bunch.keyframes)
-    if ends_in_model:
-        accepted = search.best_estimator_.predict(bunch.data, keyframes=bunch.keyframes)
-        assert accepted.shape == (8,)
 
 
 @pytest.mark.usefixtures("routing")
