@@ -1,4 +1,4 @@
-"""DenseSynchronizer with a learnt metric: noise, when none is learnt, and what sharpening brings."""
+"""DenseSynchronizer with a learnt metric: noise, when none is learnt, and what it sharpens."""
 
 import numpy as np
 import pytest

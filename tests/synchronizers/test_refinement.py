@@ -79,12 +79,10 @@ def test_there_is_no_number_of_one_trial_and_of_gaps_everywhere(known_warps):
     assert some.refines_
 
 
-def test_trials_too_short_for_their_noise_are_not_refined():
+def test_trials_too_short_for_their_noise_are_not_refined(known_warps):
     X = [np.sin(np.linspace(0, 3, n))[:, np.newaxis] for n in (4, 5, 6, 5)]
     assert not DenseSynchronizer().fit(X).refines_
-
-
-def test_equal_trials_are_copies(known_warps):
+    # Equal trials are copies.
     sync = DenseSynchronizer(P).fit([known_warps(0, 0.0)[0][0]] * 3)
     assert sync.unexplained_variance_ == 0
     assert sync.refines_

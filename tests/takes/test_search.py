@@ -538,7 +538,6 @@ ROWS = DenseSynchronizer().fit(np.stack([TAKE[:60, 0], TAKE[60:120, 0]]))
         ({"threshold": 1.5}, "The 'threshold' parameter"),
         ({"threshold": "learned"}, "The 'threshold' parameter"),
         ({"coverage": 1}, "The 'coverage' parameter"),
-        ({"pattern_rate": 0}, "The 'pattern_rate' parameter"),
         ({"frame_rate": [30, 30]}, "frame_rate must be one number above 0"),
         ({"X": [TAKE, GAP]}, r"Trial 1.*frame 7"),
         ({"X": TAKE[:, :2]}, "2 features"),
