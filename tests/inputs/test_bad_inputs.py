@@ -26,8 +26,6 @@ SYNCHRONIZERS = [
 # Input is checked in one place: an estimator of rows and one of sequences stand for all others.
 SEQUENCES = [LinearSynchronizer()]
 ALL = [ASpace(), *SEQUENCES]
-# Those that take no gaps.
-WHOLE = [ShiftSynchronizer()]
 OF_EACH_KIND = [ASpace(), *SYNCHRONIZERS, TimingChannel(LinearSynchronizer()), ActionModel()]
 
 NAMES = ["hip", "knee", "ankle"]
@@ -101,7 +99,6 @@ TRIALS = [
     (one(lambda x: list(masked(x))), ALL, ["Trial 2", "masked"]),
     (one(lambda x: masked(x).astype(object)), ALL, ["Trial 2", "masked"]),
     (one(put(1j)), ALL, ["Trial 2", "complex"]),
-    (one(put("text")), ALL, ["Trial 2", "'text'"]),
     (one(put("1.5")), ALL, ["Trial 2", "'1.5'", "numbers"]),
     (one(lambda x: x.astype(str)), ALL, ["Trial 2", "not a numeric array"]),
     (one(lambda x: x.astype("m8[s]")), ALL, ["Trial 2", "durations", "seconds"]),
@@ -114,13 +111,10 @@ TRIALS = [
     (one(put(-2e9)), ALL, ["Trial 2", "2e+09", "between 1e-09 and 1e+09", "unit"]),
     (one(lambda x: (1e30 * x).astype("f4")), ALL, ["Trial 2", "e+3", "another unit"]),
     ([1e-12 * x for x in X], ALL, ["between 1e-09 and 1e+09", "unit"]),
-    (1e-12 * X[0], ALL, ["Row ", "between 1e-09 and 1e+09", "unit"]),
     (np.full((4, 9), 2e9), ALL, ["Row 0", "2e+09", "unit"]),
     (one(lambda x: x[:0]), ALL, ["Trial 2 has shape (0, 3)", "at least 2 frames"]),
     (one(lambda x: x[:, :0]), ALL, ["Trial 2", "(20, 0)", "1 feature"]),
     (one(lambda x: x[:, 0]), ALL, ["Trial 2 has shape (20,), expected (n_frames"]),
-    (one(lambda x: x[None]), ALL, ["Trial 2 has shape (1, 20, 3), expected"]),
-    (np.empty((0, 10, 3)), ALL, ["0 trials"]),
     (np.zeros((2, 3, 4, 5)), ALL, ["shape (2, 3, 4, 5)"]),
     (np.zeros(5), ALL, ["xpected 2D array"]),
     ([np.zeros(3), np.zeros(4)], ALL, ["x[:, np.newaxis]"]),
@@ -130,7 +124,11 @@ TRIALS = [
         ALL,
         ["Trial 2", "not a numeric array", "parts differ in length", "times of spikes"],
     ),
-    (LABELLED.mask(LABELLED["knee"] == X[1][4, 1]), WHOLE, ["'bob'", "frame 4", "'hip'", "NaN"]),
+    (
+        LABELLED.mask(LABELLED["knee"] == X[1][4, 1]),
+        SYNCHRONIZERS[2:],
+        ["'bob'", "frame 4", "'hip'", "NaN"],
+    ),
     ([*FRAMES[:2], FRAMES[2][NAMES[:2]]], ALL, ["Trial 2", "it lacks ['ankle']", "common"]),
     ([*FRAMES[:2], MORE[2]], ALL, ["Trial 2", "has besides ['toe']", "columns='common'"]),
     ([*FRAMES[:2], X[2]], ALL, ["Trial 2 has the columns None", "['hip',"]),
@@ -141,7 +139,6 @@ TRIALS = [
     (["a.bvh", "b.bvh"], ALL, ["'a.bvh'", "read_motion(path) reads files"]),
     ("a.csv", ALL, ["got str"]),
     (np.ma.masked_less(X[0], 0), ALL, ["masked"]),
-    ([np.ma.masked_less(row, 0) for row in X[0]], ALL, ["masked"]),
     (X[0].astype("m8[s]"), ALL, ["durations"]),
     (X[0].astype(str).tolist(), ALL, ["not a numeric array"]),
     (LONG.drop(columns="trial"), SEQUENCES, [CALL, "'time'"]),
@@ -149,9 +146,7 @@ TRIALS = [
     (LONG, ALL, ["'trial'", "'ann'"]),
     (LABELLED.assign(k=1).set_index("k", append=True), SEQUENCES, ["(1, 3)", "at least 2 frames"]),
     (X[0].tolist()[:2] + [[1.0]], ALL, ["Trial 0 has 3 values", "x[:, np.newaxis]"]),
-    (set("ab"), ALL, ["got set", "list"]),
     (pd.Series({"a": X[0]}), ALL, ["got Series", "list"]),
-    (map(np.array, X), ALL, ["got map", "list"]),
     ([x for _, x in LONG.groupby("trial")], ALL, ["'ann'", "'trial'", CALL]),
     (
         [x.T[:, : 15 + i] for i, x in enumerate(X)],
@@ -161,8 +156,6 @@ TRIALS = [
     (one(lambda x: x.view("f8,f8,f8")[:, 0]), ALL, ["Trial 2", "structured", "3 fields"]),
     ([x.view("f8,f8,f8")[:, 0] for x in X], ALL, ["structured array", "(x)"]),
     (one(lambda x: dict(enumerate(x))), ALL, ["Trial 2 is of type dict"]),
-    (one(lambda x: iter(x)), ALL, ["Trial 2 is of type"]),
-    (one(lambda x: None), ALL, ["Trial 2 is of type NoneType"]),
     ([df.set_axis([*"aab"], axis=1) for df in FRAMES], ALL, ["Trial 0", "2 columns", "'a'"]),
     (FDataGrid(), ALL, ["got FDataGrid", "list(X.data_matrix)"]),
     ([Dataset(), Dataset()], ALL, ["got Dataset", "from_poses(poses)]"]),
@@ -177,11 +170,12 @@ TRIALS = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("given", "estimator", "words"),
-    [(given, e, words) for given, estimators, words in TRIALS for e in estimators],
-    ids=by_name,
-)
+def for_each_estimator(table):
+    """The rows of a table, one for each of the estimators that a row names last but one."""
+    return [(*row[:-2], each, row[-1]) for row in table for each in row[-2]]
+
+
+@pytest.mark.parametrize(("given", "estimator", "words"), for_each_estimator(TRIALS), ids=by_name)
 def test_fit_refuses(given, estimator, words):
     if given is LONG and estimator in SEQUENCES:
         words = [CALL]
@@ -193,21 +187,17 @@ def test_fit_refuses(given, estimator, words):
 
 FITTED_ON = [
     # fitted on, input, estimators, words
-    (FRAMES, MORE, ALL, ["Trial 0", "'toe'", "feature names should match"]),
     (FRAMES, [FRAMES[0], MORE[1]], ALL, ["Trial 1", "'toe'", "feature names should match"]),
     (NUMBERED, FRAMES, ALL, ["'hip'", "[10, 20, 30]"]),
-    (X, [x[:, :2] for x in X], ALL, ["2 features", "expecting 3"]),
     (X, one(masked), OF_EACH_KIND, ["Trial 2", "masked"]),
     (X, one(lambda x: x + 0j), ALL, ["Trial 2", "complex"]),
     (X, one(lambda x: 1e35 * x), ALL, ["Trial 2", "e+3", "another unit"]),
-    (X, X[0], SEQUENCES, ["wrap one sequence as [X]"]),
-    (np.stack(X)[:, :, 0], X, SEQUENCES, ["2-D"]),
 ]
 
 
 @pytest.mark.parametrize(
     ("training", "given", "estimator", "words"),
-    [(fit, given, e, words) for fit, given, estimators, words in FITTED_ON for e in estimators],
+    for_each_estimator(FITTED_ON),
     ids=by_name,
 )
 def test_fitted_estimator_refuses(training, given, estimator, words):
@@ -252,41 +242,35 @@ def test_message_names_the_columns_that_differ_from_those_of_fit():
     names = [f"rig_{k}" for k in range(300)]
     x = pd.DataFrame(np.eye(300), columns=names)
     other = x.rename(columns={"rig_7": "rig2_7"})
-    with pytest.raises(ValueError, match=r"lacks \['rig_7'\]; it has besides \['rig2_7'\]"):
-        ASpace().fit([x]).transform([x, other])
-    with pytest.raises(ValueError, match=r"lacks \['rig_7'\]; it has besides \['rig2_7'\]"):
-        ASpace().fit([x]).transform([other])
+    for given in ([x, other], [other]):
+        with pytest.raises(ValueError, match=r"lacks \['rig_7'\]; it has besides \['rig2_7'\]"):
+            ASpace().fit([x]).transform(given)
 
 
 # -- parameters -----------------------------------------------------------------------------
 
 PARAMETERS = [
-    # estimators, parameters, words
-    (SYNCHRONIZERS, {"pattern": X[0][:, :2]}, ["shape (n_frames, 3)", "(20, 2)"]),
-    (SEQUENCES, {"pattern": X[0][:1]}, ["at least 2 frames", "(1, 3)"]),
-    (SEQUENCES, {"pattern": masked(X[0])}, ["pattern", "masked"]),
-    (SEQUENCES, {"pattern": X[0] + 1j}, ["pattern", "complex"]),
-    (SEQUENCES, {"pattern": put(np.nan, X[0])}, ["pattern, frame 4", "NaN"]),
-    (SEQUENCES, {"pattern": X[0].astype("m8[s]")}, ["pattern", "durations"]),
-    (SEQUENCES, {"pattern": [["a"] * 3] * 5}, ["pattern", "'a'"]),
-    (SEQUENCES, {"pattern": True}, ["pattern", "index", "True"]),
-    (SYNCHRONIZERS, {"pattern": 5}, ["pattern=5", "5 trials"]),
-    (SEQUENCES, {"pattern": 1e40 * X[0]}, ["The pattern", "another unit"]),
-    (SYNCHRONIZERS, {"n_frames": 10**9}, ["n_frames = 1000000000", "GB"]),
+    # parameters, estimators, words
+    ({"pattern": X[0][:, :2]}, SYNCHRONIZERS, ["shape (n_frames, 3)", "(20, 2)"]),
+    ({"pattern": X[0][:1]}, SEQUENCES, ["at least 2 frames", "(1, 3)"]),
+    ({"pattern": masked(X[0])}, SEQUENCES, ["pattern", "masked"]),
+    ({"pattern": put(np.nan, X[0])}, SEQUENCES, ["pattern, frame 4", "NaN"]),
+    ({"pattern": True}, SEQUENCES, ["pattern", "index", "True"]),
+    ({"pattern": 5}, SYNCHRONIZERS, ["pattern=5", "5 trials"]),
+    ({"pattern": 1e40 * X[0]}, SEQUENCES, ["The pattern", "another unit"]),
+    ({"n_frames": 10**9}, SYNCHRONIZERS, ["n_frames = 1000000000", "GB"]),
     (
-        [DenseSynchronizer()],
         {"n_frames": 10**5, "max_rate": 10**5},
+        [DenseSynchronizer()],
         ["max_rate = 100000 and max_offset = ", "steps", "fewer frames"],
     ),
 ]
 
 
 @pytest.mark.parametrize(
-    ("estimator", "params", "words"),
-    [(e, params, words) for estimators, params, words in PARAMETERS for e in estimators],
-    ids=by_name,
+    ("params", "estimator", "words"), for_each_estimator(PARAMETERS), ids=by_name
 )
-def test_fit_refuses_parameters(estimator, params, words):
+def test_fit_refuses_parameters(params, estimator, words):
     refuses(lambda: clone(estimator).set_params(**params).fit(X), words)
 
 
@@ -308,8 +292,6 @@ MATCH = LinearSynchronizer().fit(X).match(X)
 CALLS = [
     # call, words
     (lambda: MODEL.accepts(masked(X[0]), 0), ["poses", "masked"]),
-    (lambda: MODEL.accepts(X[0] + 0j, 0), ["poses", "complex"]),
-    (lambda: MODEL.accepts(X[0].astype("m8[s]"), 0), ["poses", "durations"]),
     (lambda: MODEL.accepts(put(np.inf, X[0]), 0), ["poses, row 4, feature 1 is infinity"]),
     (lambda: FRAMED.accepts(put(np.inf, X[0]), 0), ["feature 1 ('knee') is infinity"]),
     (lambda: FRAMED.accepts(TURNED[0], 0), ["poses", "same order"]),
@@ -317,16 +299,12 @@ CALLS = [
     (lambda: MODEL.accepts(X[0], 20), ["frame", "0 to 19"]),
     (lambda: SPACE.inverse_transform(pd.DataFrame(X[0][:, :2], columns=list("ba"))), ["names"]),
     (lambda: KEYS.fit(X, keyframes="abcde"), ["keyframes", "not a numeric array"]),
-    (lambda: KEYS.fit(X, keyframes=[["a", "b"]] * 5), ["Trial 0", "keyframes", "'a'"]),
     (lambda: KEYS.fit(X, keyframes=[DATES[:2]] * 5), ["Trial 0", "keyframes"]),
-    (lambda: KEYS.fit(X, keyframes=[[5 + 0j, 9]] * 5), ["Trial 0", "complex"]),
     (lambda: KEYS.fit(X, keyframes=[[0.31, 0.62]] * 5), ["Trial 0", "seconds * frame_rate"]),
     (lambda: KEYED.transform(X[:1], keyframes=[[0.3, 0.6]]), ["Trial 0", "[0.3, 0.6]"]),
     (lambda: KEYED.transform(X), ["fitted with key-frames", "keyframes=[...]"]),
     (lambda: Match([[0, 3, 1, 3]]), ["Trial 0", "must not decrease", "1 at frame 2"]),
     (lambda: Match(np.ma.masked_equal([[0, 1, 2]], 1)), ["times", "masked"]),
-    (lambda: Match([["a", "b"]]), ["times", "'a'"]),
-    (lambda: Match([[0, 1j]]), ["times", "complex"]),
     (lambda: Match([[0, np.nan, 2]]), ["Trial 0", "times"]),
     (lambda: Match([[0, 1]], np.ma.masked_equal([1], 1)), ["distances", "masked"]),
     (lambda: MATCH.warp(one(masked)), ["Trial 2", "masked"]),
@@ -334,6 +312,9 @@ CALLS = [
     (lambda: MATCH.frames(["a"] * 5), ["lengths", "'a'"]),
     (lambda: to_frame(X[0]), ["single 2-D input", "[X]"]),
     (lambda: to_frame(X, columns=["a"]), ["3 features", "got 1"]),
+    (lambda: to_frame([]), ["0 trials"]),
+    (lambda: to_frame([X[0], X[0][:1]]), ["Trial 1", "at least 2 frames and 1 feature"]),
+    (lambda: to_frame(X[:2], trials=["a", "a"]), ["2 different labels"]),
     (lambda: to_frame(X[:2], trials=["a", None]), ["Trial 1", "no label", "None"]),
     (lambda: to_frame(X[:2], trials=pd.Index([np.nan, 1])), ["Trial 0", "no label"]),
     (lambda: to_frame(X[:2], trials=[("a", 1), ("a", pd.NA)]), ["Trial 1", "<NA>"]),
@@ -362,20 +343,12 @@ def test_fit_warns_of_exchanged_axes(estimator, kind):
     exchanged = kind([x.T for x in X])
     with pytest.warns(UserWarning, match=r"3 frames of 20 features.* \[x\.T for x in X\]"):
         clone(estimator).fit(exchanged)
-    noise = kind(list(RNG.standard_normal((5, 4, 50))))
+    rng = np.random.default_rng(0)
     with pytest.warns(UserWarning, match="4 frames of 50 features"):
-        clone(estimator).fit(noise)
-
-
-@pytest.mark.parametrize("estimator", ALL, ids=by_name)
-def test_fit_takes_fewer_frames_than_features_in_the_right_order(estimator):
-    many = np.cumsum(RNG.standard_normal((5, 12, 40)), axis=1)
-    for given in (many, [*many], [x[: 9 + i] for i, x in enumerate(many)] + [many[0]]):
-        if len(given) == 5 or not isinstance(estimator, ActionModel):
-            clone(estimator).fit(given)
-    # Named columns are features.
-    named = [pd.DataFrame(x.T, columns=[f"c{i}" for i in range(20)]) for x in X]
-    clone(estimator).fit(named)
+        clone(estimator).fit(kind(list(rng.standard_normal((5, 4, 50)))))
+    # In the right order there may be fewer frames than features, and named columns are features.
+    clone(estimator).fit(kind(list(np.cumsum(rng.standard_normal((5, 12, 40)), axis=1))))
+    clone(estimator).fit([pd.DataFrame(x.T, columns=[f"c{i}" for i in range(20)]) for x in X])
 
 
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
