@@ -143,7 +143,6 @@ def c3d(
     analog=None,
     words=None,
     order=None,
-    n_blocks=None,
     rotations=None,
 ):
     """A C3D file of positions (n_frames, n_points, 3); NaN is invalid.
@@ -194,8 +193,7 @@ def c3d(
         return section + bytes(2)
 
     needed = max(2, -(-(4 + len(written(4))) // 512))
-    n_blocks = needed if n_blocks is None else n_blocks
-    section = bytes([1, 0x50, n_blocks, machine]) + written(2 + needed)
+    section = bytes([1, 0x50, needed, machine]) + written(2 + needed)
     fields = {"points": n_points, "analog": analog[0].size if n_frames else 0, "first": 1}
     fields |= {"last": min(n_frames, 65535), "start": 2 + needed} | (header or {})
     head = bytes([2, 0x50]) + whole(*(fields[k] for k in ("points", "analog", "first", "last")))
@@ -205,40 +203,58 @@ def c3d(
         head = head.ljust(298, b"\0") + whole(12345, len(events), 0)
         head += b"".join(number(time) for _, time in events)
         head = head.ljust(396, b"\0") + b"".join(label.ljust(4).encode() for label, _ in events)
+    seen = ~np.isnan(positions).any(axis=2)
+    words = np.where(seen, 0.0, -1.0) if words is None else words
+    places = np.where(seen[..., np.newaxis], positions, 0.0) / (1 if real else scale)
+    points = np.concatenate([places, words[..., np.newaxis]], axis=2)
     data = b""
-    for frame in range(n_frames):
-        for i, point in enumerate(positions[frame]):
-            seen = not np.isnan(point).any()
-            word = (0.0 if seen else -1.0) if words is None else words[frame, i]
-            values = [*(point if seen else (0.0, 0.0, 0.0)), word]
-            if real:
-                data += b"".join(map(number, values))
-            else:
-                values[:3] = [value / scale for value in values[:3]]
-                data += struct.pack(order + "4h", *map(round, values))
-        for value in analog[frame].ravel():
-            data += number(value) if real else whole(int(value) % 65536)
+    for frame, samples in zip(points, analog, strict=True):
+        values = [*frame.ravel(), *samples.ravel()]
+        data += (
+            b"".join(map(number, values)) if real else whole(*(round(x) % 65536 for x in values))
+        )
     data += bytes(-len(data) % 512)
-    for value in () if rotations is None else rotations.ravel():
-        data += number(value)
+    if rotations is not None:
+        data += b"".join(map(number, rotations.ravel()))
     data += bytes(-len(data) % 512)
     return head.ljust(512, b"\0") + section.ljust(512 * needed, b"\0") + data + tail
 
 
-def poses(n_frames=40, n=2):
-    """Matrices of segments, column by column, and their reliability, of which 0 is good."""
+def poses(n_frames=40):
+    """Matrices of two segments, column by column, and their reliability, of which 0 is good."""
     rng = np.random.default_rng(1)
-    matrices = np.zeros((n_frames, n, 4, 4))
-    matrices[..., :3, :3] = rng.integers(-9, 9, (n_frames, n, 3, 3))
-    matrices[..., :3, 3] = rng.integers(-900, 900, (n_frames, n, 3)) / 2
+    matrices = np.zeros((n_frames, 2, 4, 4))
+    matrices[..., :3, :3] = rng.integers(-9, 9, (n_frames, 2, 3, 3))
+    matrices[..., :3, 3] = rng.integers(-900, 900, (n_frames, 2, 3)) / 2
     matrices[..., 3, 3] = 1
-    columns = matrices.swapaxes(2, 3).reshape(n_frames, n, 16)
-    return np.concatenate([columns, np.zeros((n_frames, n, 1))], axis=2)
+    columns = matrices.swapaxes(2, 3).reshape(n_frames, 2, 16)
+    return np.concatenate([columns, np.zeros((n_frames, 2, 1))], axis=2)
 
 
-def rotation_parameters(n=2, **changes):
-    labels = texts(*[f"{name}_4X4" for name in ("pelvis", "l_thigh", "head")][:n])
-    return {"USED": words(n), "LABELS": labels, "DATA_START": None} | changes
+def rotation_parameters(**changes):
+    labels = texts("pelvis_4X4", "l_thigh_4X4")
+    return {"USED": words(2), "LABELS": labels, "DATA_START": None} | changes
+
+
+def analog_parameters(n=3, **changes):
+    return {
+        "USED": words(n),
+        "LABELS": texts("Fx", "EMG"),
+        "LABELS2": texts("EMG"),
+        "UNITS": texts("N", "V"),
+        "SCALE": floats(0.5, 2, -1),
+        "OFFSET": words(10, -20, 0),
+        "GEN_SCALE": floats(0.25),
+    } | changes
+
+
+def event_parameters(**changes):
+    return {
+        "USED": words(3),
+        "LABELS": texts("Foot Off", "Foot Strike", "Turn"),
+        "CONTEXTS": texts("Left", "Right"),
+        "TIMES": floats(0, 2.5, 0, 2.2, 1, 0.5),
+    } | changes
 
 
 def tracks(n_frames=40, gap=None):
@@ -248,34 +264,17 @@ def tracks(n_frames=40, gap=None):
     return positions
 
 
-def everything(machine=84):
-    """What a C3D file of that machine may hold beside markers, for `c3d`."""
-    order = ">" if machine == 86 else "<"
-
-    def floats(*values):
-        each = dec if machine == 85 else struct.Struct(order + "f").pack
-        return b"".join(map(each, values))
-
-    events = {
-        "USED": (2, [], struct.pack(order + "H", 3)),
-        "LABELS": texts("Foot Off", "Foot Strike", "Turn"),
-        "CONTEXTS": texts("Left", "Right", "General"),
-        "TIMES": (4, [2, 3], floats(0, 2.5, 0, 2.25, 1, 0.5)),
-    }
-    analog = {
-        "USED": (2, [], struct.pack(order + "H", 2)),
-        "LABELS": texts("Fx", "EMG"),
-        "UNITS": texts("N", "V"),
-        "SCALE": (4, [2], floats(0.5, 2)),
-        "OFFSET": (2, [2], struct.pack(order + "2h", 10, -20)),
-        "GEN_SCALE": (4, [], floats(0.25)),
-    }
+def everything():
+    """What a C3D file may hold beside markers, for `c3d`."""
     return {
         "positions": tracks(gap=(3, 9)),
-        "machine": machine,
-        "analog": np.random.default_rng(0).integers(-900, 900, (40, 2, 2)),
+        "analog": np.random.default_rng(0).integers(-900, 900, (40, 2, 3)),
         "changes": {"ANGLES": texts("M2"), "ANGLE_UNITS": texts("deg")},
-        "others": {"EVENT": events, "ANALOG": analog, "ROTATION": rotation_parameters()},
+        "others": {
+            "EVENT": event_parameters(),
+            "ANALOG": analog_parameters(),
+            "ROTATION": rotation_parameters(),
+        },
         "rotations": poses(),
         "header": {"first": 101, "last": 140, "events": [("RHS", 0.5), ("RTO", 0.1)]},
     }
@@ -392,9 +391,7 @@ def nexus():
 
 
 def table(columns, rows, separator=","):
-    """A table of text, blank where a number is missing."""
-    cells = [["" if value is None else str(value) for value in row] for row in rows]
-    return "".join(separator.join(row) + "\n" for row in [columns, *cells])
+    return cells(columns, *rows, separator=separator)
 
 
 def deeplabcut(tracked, joints, animals=None):

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync.io import read_motion
 
-from motion_files import c3d, floats, put, texts, tracks, words
+from motion_files import analog_parameters, c3d, event_parameters, floats, put, texts, tracks, words
 
 
 @pytest.mark.parametrize("machine", [84, 85, 86])
@@ -304,25 +304,10 @@ def test_missing_groups_are_refused(tmp_path):
 # -- analog channels --------------------------------------------------------------------
 
 
-def analog_parameters(n=3, **changes):
-    return {
-        "ANALOG": {
-            "USED": words(n),
-            "LABELS": texts("Fx", "EMG"),
-            "LABELS2": texts("EMG"),
-            "UNITS": texts("N", "V"),
-            "SCALE": floats(0.5, 2, -1),
-            "OFFSET": words(10, -20, 0),
-            "GEN_SCALE": floats(0.25),
-        }
-        | changes
-    }
-
-
 @pytest.mark.parametrize("real", [True, False])
 def test_analog_channels_are_scaled(tmp_path, real):
     raw = np.random.default_rng(0).integers(-2000, 2000, (40, 4, 3))
-    content = c3d(tracks(), real=real, analog=raw, others=analog_parameters())
+    content = c3d(tracks(), real=real, analog=raw, others={"ANALOG": analog_parameters()})
     path = put(tmp_path, content, "a.c3d")
     df = read_motion(path, group="analog")
     expected = (raw.reshape(160, 3) - [10, -20, 0]) * [0.125, 0.5, -0.25]
@@ -338,7 +323,7 @@ def test_analog_channels_are_scaled(tmp_path, real):
 def test_analog_channels_may_be_unsigned(tmp_path):
     raw = np.random.default_rng(0).integers(0, 65536, (40, 2, 1))
     changes = {"FORMAT": texts("UNSIGNED"), "OFFSET": words(40000), "GEN_SCALE": None}
-    others = analog_parameters(1, **changes)
+    others = {"ANALOG": analog_parameters(1, **changes)}
     path = put(tmp_path, c3d(tracks(), real=False, analog=raw, others=others), "a.c3d")
     df = read_motion(path, group="analog")
     np.testing.assert_array_equal(df["Fx"], (raw.ravel() - 40000) * 0.5)
@@ -348,10 +333,15 @@ def test_analog_channels_may_be_unsigned(tmp_path):
 @pytest.mark.parametrize(("header", "used"), [(3, 3), (9, 3), (12, 9), (12, 2.5), (12, -3)])
 def test_of_two_numbers_of_analog_values_the_size_tells_the_right_one(tmp_path, real, header, used):
     raw = np.random.default_rng(0).integers(-2000, 2000, (40, 4, 3))
-    others = analog_parameters(USED=floats(used) if used % 1 or used < 0 else words(used))
+    used = floats(used) if used % 1 or used < 0 else words(used)
+    others = {"ANALOG": analog_parameters(USED=used)}
     content = c3d(tracks(), real=real, analog=raw, others=others, header={"analog": header})
     path = put(tmp_path, content, "a.c3d")
-    right = put(tmp_path, c3d(tracks(), real=real, analog=raw, others=analog_parameters()), "b.c3d")
+    right = put(
+        tmp_path,
+        c3d(tracks(), real=real, analog=raw, others={"ANALOG": analog_parameters()}),
+        "b.c3d",
+    )
     size = (40 * 12 + raw.size) * (4 if real else 2)
     exact = put(tmp_path, content[: 512 * (content[16] - 1) + size], "c.c3d")  # no padding
     for group in ("analog", "markers"):
@@ -363,7 +353,9 @@ def test_of_two_numbers_of_analog_values_the_size_tells_the_right_one(tmp_path, 
 @pytest.mark.parametrize(("header", "used"), [(9, 7), (24, 4)])
 def test_two_numbers_of_analog_values_that_do_not_fit_are_refused(tmp_path, header, used):
     raw = np.ones((40, 4, 3))
-    content = c3d(tracks(), analog=raw, others=analog_parameters(used), header={"analog": header})
+    content = c3d(
+        tracks(), analog=raw, others={"ANALOG": analog_parameters(used)}, header={"analog": header}
+    )
     message = rf"a\.c3d: the header says {header} analog values .* ANALOG:USED says {used} channels"
     with pytest.raises(ValueError, match=message):
         read_motion(put(tmp_path, content, "a.c3d"))
@@ -379,7 +371,9 @@ def test_two_numbers_of_analog_values_that_do_not_fit_are_refused(tmp_path, head
     ],
 )
 def test_wrong_scales_are_refused_for_analog_channels_only(tmp_path, changes, message):
-    content = c3d(tracks(), analog=np.ones((40, 2, 3)), others=analog_parameters(**changes))
+    content = c3d(
+        tracks(), analog=np.ones((40, 2, 3)), others={"ANALOG": analog_parameters(**changes)}
+    )
     path = put(tmp_path, content, "a.c3d")
     assert len(read_motion(path)) == 40
     with pytest.raises(ValueError, match=rf"a\.c3d: .*{message}.*Export the recording again\.$"):
@@ -387,15 +381,6 @@ def test_wrong_scales_are_refused_for_analog_channels_only(tmp_path, changes, me
 
 
 # -- events -----------------------------------------------------------------------------
-
-
-def event_parameters(**changes):
-    return {
-        "USED": words(3),
-        "LABELS": texts("Foot Off", "Foot Strike", "Turn"),
-        "CONTEXTS": texts("Left", "Right"),
-        "TIMES": (4, [2, 3], struct.pack("<6f", 0, 2.5, 0, 2.2, 1, 0.5)),
-    } | changes
 
 
 @pytest.mark.parametrize("group", ["EVENT", "EVENTS"])
