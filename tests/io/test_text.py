@@ -1,5 +1,7 @@
 """What the readers of text files share: words and their lines, numbers and their limits, names."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 import sklearn_motionsync.io.text as text_module
@@ -26,8 +28,7 @@ def test_words_come_with_the_number_of_their_line(tmp_path, end, mark):
     content = mark + end.join(["", "a b", "  ", "c{d}", "e f g", "", "h", "i"])
     text = opened(tmp_path, content)
     words = [(text.word("one"), text.line_number) for _ in range(7)]
-    expected = [(b"a", 2), (b"b", 2), (b"c", 4), (b"{", 4), (b"d", 4), (b"}", 4), (b"e", 5)]
-    assert words == expected
+    assert words == [(b"a", 2), (b"b", 2), *((x, 4) for x in (b"c", b"{", b"d", b"}")), (b"e", 5)]
     # What is left of the line, and the lines behind it.
     assert text.line() == [b"f", b"g"]
     assert (text.row(), text.line_number, text.is_whole) == (b"h", 7, True)
@@ -37,47 +38,21 @@ def test_words_come_with_the_number_of_their_line(tmp_path, end, mark):
     with pytest.raises(ValueError, match=r"a\.txt, line 8: the file ends where one should follow"):
         text.word("one")
     text = opened(tmp_path, content)
-    lines = [(words, text.line_number) for words in text.lines()]
-    assert lines == [
-        ([b"a", b"b"], 2),
-        ([b"c{d}"], 4),
-        ([b"e", b"f", b"g"], 5),
-        ([b"h"], 7),
-        ([b"i"], 8),
-    ]
+    lines = [(b" ".join(words), text.line_number) for words in text.lines()]
+    assert lines == [(b"a b", 2), (b"c{d}", 4), (b"e f g", 5), (b"h", 7), (b"i", 8)]
 
 
-@pytest.mark.parametrize(
-    ("word", "good"),
-    [
-        (b"0", True),
-        (b"-999999999999", True),
-        (b"1e12", False),
-        (b"-1e12", False),
-        (b"inf", False),
-        (b"nan", False),
-        (b"1_0", False),
-        (b"x", False),
-        (b"\xff", False),
-        (b"1e-300", True),
-    ],
-)
-def test_numbers_are_finite_and_below_a_limit(tmp_path, word, good):
-    text = opened(tmp_path, "")
-    for words in ([word], [b"1", word], [word, b"-2.5"]):
-        if good:
-            assert list(text.numbers(words, len(words), "it")) == list(map(float, words))
-            continue
-        with pytest.raises(ValueError, match="it needs finite numbers below 1e") as caught:
-            text.numbers(words, len(words), "it")
-        caught.match("got '" + ("ÿ" if word == b"\xff" else word.decode()))
+def test_numbers_are_finite_and_below_a_limit(tmp_path):
+    """Each of them, and not their sum."""
+    text, words = opened(tmp_path, ""), [b"0", b"-999999999999", b"1e-300", b"9e11", b"9e11"]
+    assert list(text.numbers(words, 5, "it")) == list(map(float, words))
+    for word in (b"1e12", b"-1e12", b"inf", b"nan", b"1_0", b"x", b"\xff"):
+        for words in ([word], [b"1", word], [word, b"-2.5"]):
+            with pytest.raises(ValueError, match="it needs finite numbers below 1e") as caught:
+                text.numbers(words, len(words), "it")
+            caught.match(f"got '{word.decode('latin-1')}")
     with pytest.raises(ValueError, match=r"it needs 2 numbers, got 1 \("):
-        text.numbers([word], 2, "it")
-
-
-def test_many_numbers_below_the_limit_are_read(tmp_path):
-    words = [b"9e11"] * 4
-    assert list(opened(tmp_path, "").numbers(words, 4, "it")) == [9e11] * 4
+        text.numbers([b"0"], 2, "it")
     text = opened(tmp_path, "9e11 9e11\n-9e11 9e11\n")
     assert text.table(2, "a frame").tolist() == [[9e11, 9e11], [-9e11, 9e11]]
 
@@ -88,11 +63,9 @@ def test_many_numbers_below_the_limit_are_read(tmp_path):
 )
 def test_positive_numbers_have_an_inverse_below_the_limit(tmp_path, word, number):
     text = opened(tmp_path, "")
-    if number:
+    message = "it must be above 0, got"
+    with nullcontext() if number else pytest.raises(ValueError, match=message):
         assert text.positive([word.encode()], "it") == number
-    else:
-        with pytest.raises(ValueError, match="it must be above 0, got"):
-            text.positive([word.encode()], "it")
 
 
 @pytest.mark.parametrize(
@@ -102,11 +75,9 @@ def test_positive_numbers_have_an_inverse_below_the_limit(tmp_path, word, number
 )
 def test_counts_are_whole_numbers(tmp_path, word, count):
     text = opened(tmp_path, "")
-    if count is not None:
+    message = f"it needs a whole number, 0 or more, got '{word}'"
+    with pytest.raises(ValueError, match=message) if count is None else nullcontext():
         assert text.count(word.encode(), "it") == count
-    else:
-        with pytest.raises(ValueError, match=f"it needs a whole number, 0 or more, got '{word}'"):
-            text.count(word.encode(), "it")
 
 
 @pytest.mark.parametrize(
@@ -181,13 +152,9 @@ def test_an_empty_table_has_its_columns(tmp_path):
     ],
 )
 def test_results_are_in_proportion_to_their_file(n_bytes, file_size, refused):
-    if not refused:
-        check_result_size("a.x", file_size, n_bytes, "it")
-        return
-    message = (
-        rf"^a\.x: it would take {round(n_bytes / 2**20)} MB, from a file of {file_size / 2**20:.2f}"
-    )
-    with pytest.raises(ValueError, match=message):
+    size = f"{round(n_bytes / 2**20)} MB, from a file of {file_size / 2**20:.2f}"
+    message = rf"^a\.x: it would take {size}"
+    with pytest.raises(ValueError, match=message) if refused else nullcontext():
         check_result_size("a.x", file_size, n_bytes, "it")
 
 
@@ -238,11 +205,8 @@ def test_times_that_are_none_or_decrease_are_refused(tmp_path, times):
     with pytest.raises(ValueError, match="the time of a row must be a number, and"):
         read_timed_rows(opened(tmp_path, ""), [[time.encode()] for time in times], 0)
     good = [[b"-9e11"], [b"9e11"], [b"9e11"]]
-    assert [row[0] for row in read_timed_rows(opened(tmp_path, ""), good, 0)[0]] == [
-        -9e11,
-        9e11,
-        9e11,
-    ]
+    numbers, _ = read_timed_rows(opened(tmp_path, ""), good, 0)
+    assert np.ravel(numbers).tolist() == [-9e11, 9e11, 9e11]
     with pytest.raises(ValueError, match="the file ends where frames should follow"):
         read_timed_rows(opened(tmp_path, ""), [], 0)
 
@@ -253,10 +217,8 @@ def test_times_that_are_none_or_decrease_are_refused(tmp_path, times):
 @pytest.mark.parametrize("seed", range(5))
 def test_names_that_come_again_get_the_next_free_number(seed):
     rng = np.random.default_rng(seed)
-    names = [
-        rng.choice(["a", "b", "a_2", "a_3", "a_2_2", "b_2"]) for _ in range(rng.integers(1, 12))
-    ]
-    names = list(map(str, names))
+    choices = ["a", "b", "a_2", "a_3", "a_2_2", "b_2"]
+    names = rng.choice(choices, rng.integers(1, 12)).tolist()
     expected, last = [], {}
     for k, name in enumerate(names):
         if name not in names[:k]:
@@ -274,10 +236,7 @@ def test_names_that_come_again_get_the_next_free_number(seed):
     ("names", "subjects"),
     [
         (["Ann:LASI", "Ann:RASI", "*12", "C:7"], ["Ann", "Ann", "", ""]),
-        (
-            ["Ann:LASI", "Ann:RASI", "Bob:LASI", "Bob:", "Bob:RASI"],
-            ["Ann", "Ann", "Bob", "", "Bob"],
-        ),
+        (["A:LASI", "A:RASI", "B:LASI", "B:", "B:RASI"], ["A", "A", "B", "", "B"]),
         (["lab:Ann:LASI", "lab:Ann:RASI", ":a", ":b"], ["lab:Ann", "lab:Ann", "", ""]),
         (["Ann:LASI"], [""]),
         (["Ann_LASI", "Ann_RASI"], ["Ann", "Ann"]),
@@ -286,8 +245,6 @@ def test_names_that_come_again_get_the_next_free_number(seed):
         (["L_Knee", "L_Ankle"], ["", ""]),
         (["Ann_Left_Knee", "Ann_Left_Ankle"], ["Ann", "Ann"]),
         (["box_front", "box_back", "box_top"], ["", "", ""]),
-        (["M_1", "M_2", "M_3"], ["", "", ""]),
-        (["Ann_LASI"], [""]),
         ([], []),
     ],
 )
