@@ -25,10 +25,10 @@ def test_positions_by_hand(tmp_path):
     # The thigh's x axis is the root's y, about which -y does not turn; shin and thigh are one line.
     np.testing.assert_allclose(df.iloc[1].to_numpy().reshape(3, 3), expected, atol=1e-12)
     bent = AMC.replace("thigh 90 0", "thigh 0 90")
+    bent = acclaim(tmp_path, amc=bent.replace(":DEGREES", ":DEGREES\n:SAMPLES-PER-SECOND 60"))
     expected = np.array([[1, 2, 3], [1, 2, -1], [1, 2, -4]]) * INCH
-    np.testing.assert_allclose(
-        acclaim(tmp_path, amc=bent).iloc[1].to_numpy().reshape(3, 3), expected, atol=1e-12
-    )
+    np.testing.assert_allclose(bent.iloc[1].to_numpy().reshape(3, 3), expected, atol=1e-12)
+    assert bent.attrs["frame_rate"] == 60
 
 
 def test_degrees_of_freedom_act_in_their_order_about_fixed_axes(tmp_path):
@@ -63,20 +63,15 @@ def test_lines_that_are_left_out_have_defaults(tmp_path):
 
 
 def test_angles_may_be_radians(tmp_path):
+    """The motion says its own unit, or has that of the skeleton."""
     expected = acclaim(tmp_path)
-    asf = ASF.replace("angle deg", "angle Radians").replace("0 0 90", f"0 0 {np.pi / 2}")
-    amc = AMC.replace("90", f"{np.pi / 2}").replace(":DEGREES\n", "")
-    pd.testing.assert_frame_equal(acclaim(tmp_path, asf, amc), expected)
-    pd.testing.assert_frame_equal(acclaim(tmp_path, asf, AMC), expected)
-    asf = ASF.replace("angle deg", "angle degrees")
-    pd.testing.assert_frame_equal(acclaim(tmp_path, asf), expected)
-
-
-@pytest.mark.parametrize(("word", "unit"), [(":DEGREES", 1), (":radians", np.pi / 180)])
-def test_the_motion_says_its_own_unit_of_angles(tmp_path, word, unit):
-    expected = acclaim(tmp_path)
-    for asf in (ASF, ASF.replace("angle deg", "angle rad").replace("0 0 90", f"0 0 {np.pi / 2}")):
-        df = acclaim(tmp_path, asf, AMC.replace("90", f"{90 * unit}").replace(":DEGREES", word))
+    in_radians = ASF.replace("angle deg", "angle Radians").replace("0 0 90", f"0 0 {np.pi / 2}")
+    motion = AMC.replace("90", f"{np.pi / 2}")
+    df = acclaim(tmp_path, in_radians, motion.replace(":DEGREES\n", ""))
+    pd.testing.assert_frame_equal(df, expected)
+    for asf in (ASF, in_radians, ASF.replace("angle deg", "angle degrees")):
+        pd.testing.assert_frame_equal(acclaim(tmp_path, asf, AMC), expected)
+        df = acclaim(tmp_path, asf, motion.replace(":DEGREES", ":radians"))
         np.testing.assert_allclose(df, expected, atol=1e-12)
 
 
@@ -112,11 +107,6 @@ def test_small_file_with_a_huge_result_is_refused(tmp_path):
         acclaim(tmp_path, asf, amc)
 
 
-def test_frame_rate_is_the_stated_one(tmp_path):
-    amc = AMC.replace(":DEGREES", ":DEGREES\n:SAMPLES-PER-SECOND 60")
-    assert acclaim(tmp_path, amc=amc).attrs["frame_rate"] == 60
-
-
 @pytest.mark.parametrize("between", ["_", "-", " "])
 def test_skeleton_is_found_by_its_name(tmp_path, between):
     put(tmp_path, ASF.replace("length 0.5", "length 1"), "HDM.asf")
@@ -146,10 +136,8 @@ def test_skeleton_is_found_by_its_name(tmp_path, between):
         ("thigh shin\n", "thigh shin\nleg\n", ":hierarchy names 'leg', which is not in :bonedata"),
         ("thigh shin\n", "shin thigh\n", ":hierarchy gives 'thigh' two parents"),
         ("thigh shin\n", "\n", "does not connect 1 bone to the root, 'shin' is one"),
-        ("root thigh\n", "\n", "does not connect 2 bones to the root, 'shin' is one"),
         (":bonedata", ":bones", ":hierarchy names 'thigh', which is not in :bonedata"),
         (ASF[ASF.index(":bonedata") :], "", "ends without a complete :root, :bonedata"),
-        ("4\n", "1e308\n", "length needs finite numbers below 1e.12, got '1e308'"),
     ],
 )
 def test_wrong_skeletons_are_refused(tmp_path, old, new, message):
@@ -168,11 +156,7 @@ def test_wrong_skeletons_are_refused(tmp_path, old, new, message):
         ("thigh 0 0", "shin 0", "line 6: expected .* a bone that moves in a.asf"),
         ("thigh 0 0", "thigh 0 0\nthigh 0 0", "line 7: expected .* once a frame"),
         ("thigh 0 0", "thigh 0", "line 6: bone 'thigh' needs 2 numbers, got 1"),
-        (
-            "thigh 0 0",
-            "thigh 0 nan",
-            "line 6: bone 'thigh' needs finite numbers below 1e.12, got 'nan'",
-        ),
+        ("thigh 0 0", "thigh 0 nan", "line 6: bone 'thigh' needs finite numbers .* got 'nan'"),
         ("thigh 0 0\n", "", "frame 1 has no values of 'thigh', .* or asf= is not its skeleton"),
         ("thigh 90 0\n", "", "frame 2 has no values of 'thigh', .* the file is not complete"),
         ("\n2\n", "\n3\n", "line 7: frame '3' follows frame 1; frames must be numbered"),

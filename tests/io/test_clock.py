@@ -76,8 +76,12 @@ def test_a_moment_is_in_the_row_of_its_seconds(tmp_path, way):
     for part in WAYS[way](df, tmp_path):
         seconds = part.iloc[:, 0].to_numpy()
         at = seconds[1] + 0.37 * (seconds[-1] - seconds[1])
+        frames = part.index if part.index.name == "frame" else np.arange(len(part))
+        step = (seconds[1] - seconds[0]) / (frames[1] - frames[0])
+        for event in part.attrs.pop("events", ()):
+            time = seconds[0] + (event["frame"] - frames[0]) * step
+            assert time == pytest.approx(event["time"], abs=1e-4)
         part.attrs |= {"trial": "x", "levels": ["trial", "frame"]}
-        part.attrs.pop("events", None)
         table = pd.DataFrame({"trial": ["x"], "event": ["e"], "seconds": [at]})
         (row,) = keyframes_from_events([part], table)["e"]
         assert np.interp(row, np.arange(len(seconds)), seconds) == pytest.approx(at, abs=1e-4)

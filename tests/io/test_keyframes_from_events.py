@@ -31,16 +31,17 @@ def table(time="frame", scale=1.0, start=0, ids=int, event="event"):
     return pd.DataFrame(rows).sample(frac=1, random_state=0)
 
 
-def check(found, index=None):
+def check(found):
     np.testing.assert_allclose(found.to_numpy(), list(TRUTH.values()), rtol=0, atol=1e-9)
     assert found.columns.tolist() == NAMES
-    assert found.index.to_list() == (list(TRUTH) if index is None else index)
+    assert found.index.to_list() == list(TRUTH)
 
 
 @pytest.mark.parametrize("time", ["frame", "Frame", " FRAMES "])
 @pytest.mark.parametrize("ids", [int, str, float, np.int8])
 def test_rows_of_any_order_and_ids_of_any_type(time, ids):
-    check(keyframes_from_events(trials(), table(time, ids=ids)))
+    # Frames count where times are given as well.
+    check(keyframes_from_events(trials(), table(time, ids=ids).assign(time=1e6)))
     renamed = table(time, ids=ids, event="Label").rename(columns={"subject": "Subject"})
     check(keyframes_from_events(trials(), renamed))
     check(keyframes_from_events(trials(), renamed.set_index(["Subject", "trial"])))
@@ -54,7 +55,7 @@ def test_seconds(time):
     check(keyframes_from_events(X, events, frame_rate=200))
     check(keyframes_from_events(X, events, frame_rate=[200] * 3))
     check(keyframes_from_events(trials(frame_rate=200.0), events))
-    with pytest.raises(ValueError, match=r"frame rate of trial 0 \('ann', 1\)|frame rate of"):
+    with pytest.raises(ValueError, match="frame rate of"):
         keyframes_from_events(X, events)
     # As events of one recording are, of which the trials are parts.
     late = trials(frame_rate=200.0, first_time=3.0)
@@ -73,18 +74,13 @@ def test_times_and_frames_are_those_of_the_index():
     check(keyframes_from_events(X, table("seconds", 1 / 50, start=40)))
 
 
-def test_frames_count_where_both_are_given():
-    check(keyframes_from_events(trials(), table().assign(time=1e6)))
-
-
 @pytest.mark.parametrize("make", [list, np.stack, lambda X: np.stack(X)[:, :, 0]])
 def test_arrays_are_numbered(make):
     X = make([np.zeros((100, 1))] * 3)
-    for column in ("trial", "trial"):
-        events = pd.DataFrame({column: [2, 0], "event": "apex", "frame": [40, 30.5]})
-        found = keyframes_from_events(X, events)
-        np.testing.assert_array_equal(found["apex"], [30.5, np.nan, 40])
-        assert found.index.to_list() == [0, 1, 2]
+    events = pd.DataFrame({"trial": [2, 0], "event": "apex", "frame": [40, 30.5]})
+    found = keyframes_from_events(X, events)
+    np.testing.assert_array_equal(found["apex"], [30.5, np.nan, 40])
+    assert found.index.to_list() == [0, 1, 2]
     contexts = events.assign(context=["Left", None])
     assert set(keyframes_from_events(X, contexts).columns) == {("apex", "Left"), "apex"}
 
@@ -95,9 +91,8 @@ def test_names_choose_and_order():
     check(found.set_axis(NAMES, axis=1))
     (only,) = keyframes_from_events(trials(), table(), ["knee flexed"]).columns
     assert only == "knee flexed"
-    with pytest.raises(
-        ValueError, match=r"\('ann', 1\): event 'toe-off' in row 62 is not after 'kn"
-    ):
+    message = r"\('ann', 1\): event 'toe-off' in row 62 is not after 'kn"
+    with pytest.raises(ValueError, match=message):
         keyframes_from_events(trials(), table(), NAMES[::-1])
 
 
@@ -158,19 +153,11 @@ def test_bad_tables_are_refused(name):
         keyframes_from_events(trials(), events)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"names": ["apex"]}, r"No trial has the event 'apex' .*; there are \['"),
-        ({"names": [3]}, "each of names must be the label of an event, or a pair .*, got 3"),
-    ],
-)
-def test_bad_arguments_are_refused(given, message):
-    with pytest.raises(ValueError, match=message):
-        keyframes_from_events(trials(), table(), **given)
-
-
-def test_trials_without_events_have_none():
+def test_bad_names_and_no_table_are_refused():
+    with pytest.raises(ValueError, match=r"No trial has the event 'apex' .*; there are \['"):
+        keyframes_from_events(trials(), table(), ["apex"])
+    with pytest.raises(ValueError, match="each of names must be the label of an event"):
+        keyframes_from_events(trials(), table(), [3])
     with pytest.raises(ValueError, match="No trial has an event: give a table"):
         keyframes_from_events(trials())
 
@@ -178,6 +165,7 @@ def test_trials_without_events_have_none():
 # -- events of recordings -------------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
 def gait_cycles():
     gait = make_gait(4, 3, takes=True, random_state=0)
     takes = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
@@ -186,8 +174,8 @@ def gait_cycles():
     return gait, takes, [x for take in takes for x in cut_at_events(take, "Foot Strike")]
 
 
-def test_events_of_cut_cycles():
-    gait, takes, cycles = gait_cycles()
+def test_events_of_cut_cycles(gait_cycles):
+    gait, takes, cycles = gait_cycles
     found = keyframes_from_events(cycles)
     assert found.columns.tolist() == [("Foot Off", "Right")]
     # The true toe-offs, by the key-frames of the takes.
@@ -201,17 +189,13 @@ def test_events_of_cut_cycles():
     )
     with pytest.raises(ValueError, match=r"'Right'\) comes twice, in rows .* by cut_at_events"):
         keyframes_from_events(takes)
+    with pytest.raises(ValueError, match="Trial 0: by its index row 0 is frame 5 of the rec"):
+        keyframes_from_events([cycles[0].iloc[5:]])
     sync = DenseSynchronizer(60).fit(cycles, keyframes=found)
     own = truth * 59 / (np.array([len(x) for x in cycles]) - 1)
     times = sync.match(cycles, keyframes=found).times
     met = [np.interp(sync.keyframes_[0], np.arange(60), tau) for tau in times]
     np.testing.assert_allclose(met, own, atol=1e-3)
-
-
-def test_rows_that_events_do_not_count_are_refused():
-    _, _, cycles = gait_cycles()
-    with pytest.raises(ValueError, match="Trial 0: by its index row 0 is frame 5 of the rec"):
-        keyframes_from_events([cycles[0].iloc[5:]])
 
 
 @pytest.mark.filterwarnings("ignore:.*missing:UserWarning")

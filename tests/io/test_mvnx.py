@@ -67,13 +67,9 @@ BOMB = '<!DOCTYPE mvnx [<!ENTITY a "1 2 3"><!ENTITY b "&a;&a;&a;">]>'
         (b"", "the file is damaged or not complete"),
         (mvnx(tracks()[:0]), "frame 0: the file ends where frames should follow"),
         (mvnx(tracks()).replace('"L3"', '""'), None),
-        (mvnx(tracks()).replace("Pelvis", "L3"), None),
         (mvnx(tracks()).replace('label="T', ""), None),
         (mvnx(tracks(), more="<subject/>"), "a second subject begins"),
-        (
-            mvnx(tracks()).replace("</segments>", '<segment label="x"/></segments>'),
-            "for each of 4 s",
-        ),
+        (mvnx(tracks()).replace("</segments>", '<segment label="x"/></segments>'), "of 4 segm"),
         (mvnx(tracks(), times=range(40, 0, -1)), "frame 1: the time of a row .* got 39 after 40"),
     ],
 )
@@ -88,9 +84,7 @@ def test_wrong_files_are_refused(tmp_path, content, message):
 
 def test_groups_that_are_not_there_are_refused(tmp_path):
     path = put(tmp_path, mvnx(tracks()), "a.mvnx")
-    with pytest.raises(
-        ValueError, match=r"a\.mvnx, frame 0: <jointAngle> needs 3 numbers for each"
-    ):
+    with pytest.raises(ValueError, match=r"a\.mvnx, frame 0: <jointAngle> needs 3 numbers for ea"):
         read_motion(path, group="angles")
     with pytest.raises(ValueError, match=r"there are no forces in it; group= reads \['segments', "):
         read_motion(path, group="forces")

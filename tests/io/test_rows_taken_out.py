@@ -84,9 +84,7 @@ def test_rows_that_were_dropped_are_not_bridged(seed):
         if some["number"].min() <= part["number"].min() and part["number"].max() <= last
     ]
     if any(part["knee"].isna().any() for part in whole):
-        with pytest.raises(
-            ValueError, match=r"there is no row of frame .*Cut the recording before rows"
-        ):
+        with pytest.raises(ValueError, match=r"no row of frame .*Cut the recording before rows"):
             cut_at_events(some, "Strike")
         return
     found = cut_at_events(some, "Strike")
@@ -99,13 +97,10 @@ def test_rows_that_were_dropped_are_not_bridged(seed):
 def test_rows_in_another_order_are_refused(order):
     rng = np.random.default_rng(0)
     df = recording(rng)
+    assert cut_at_events(df.iloc[:0], "Strike") == []
     other = df.iloc[::-1] if order == "reversed" else df.iloc[rng.permutation(len(df))]
     with pytest.raises(ValueError, match=r"not in order of time: frame .*sort_index"):
         cut_at_events(other, "Strike")
-    for x, y in zip(
-        cut_at_events(other.sort_index(), "Strike"), cut_at_events(df, "Strike"), strict=True
-    ):
-        pd.testing.assert_frame_equal(x, y)
 
 
 @pytest.mark.parametrize(
@@ -128,11 +123,6 @@ def test_an_index_that_does_not_tell_frames_is_refused(index):
     assert part.attrs["rows"] == [9, 30]
     (x,) = to_trials(df.assign(trial=0), by="trial")
     assert "events" not in x.attrs
-
-
-def test_an_empty_recording_has_no_trials():
-    df = recording(np.random.default_rng(0))
-    assert cut_at_events(df.iloc[:0], "Strike") == []
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -245,6 +245,7 @@ def test_names_that_come_again_get_the_next_free_number(seed):
         (["L_Knee", "L_Ankle"], ["", ""]),
         (["Ann_Left_Knee", "Ann_Left_Ankle"], ["Ann", "Ann"]),
         (["box_front", "box_back", "box_top"], ["", "", ""]),
+        (["Ann_LASI"], [""]),
         ([], []),
     ],
 )

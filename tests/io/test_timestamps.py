@@ -1,6 +1,7 @@
 """Times of frames: the frame rate of even ones, whatever their digits, and what is not even."""
 
 import warnings
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -103,8 +104,6 @@ def test_few_digits_are_even_and_show_each_lost_frame(rate, digits, decimals, n_
         # A tenth of a step and half a digit; at most 0.45 of a step.
         (17, 0.09, True),
         (17, 0.11, False),
-        (3, 0.12, True),
-        (3, 0.13, False),
         (2, 0.34, True),
         (2, 0.36, False),
         (1, 0.44, True),
@@ -113,12 +112,9 @@ def test_few_digits_are_even_and_show_each_lost_frame(rate, digits, decimals, n_
 )
 def test_even_times_miss_their_places_by_a_tenth_of_a_step_and_half_a_digit(decimals, off, even):
     times = (np.arange(41) + off * (-1.0) ** np.arange(41)) * STEP
-    if even:
-        assert described(times, decimals=decimals)["frame_rate"] == 50
-    else:
-        with pytest.warns(UserWarning, match="uneven"):
-            facts = describe_times("a.trc", times, decimals=decimals)
-        assert facts["frame_rate"] is None
+    with nullcontext() if even else pytest.warns(UserWarning, match="uneven"):
+        facts = describe_times("a.trc", times, decimals=decimals)
+    assert facts["frame_rate"] == (50 if even else None)
 
 
 @pytest.mark.parametrize(("gap", "kept"), [(1.85, True), (1.95, False)])
@@ -127,11 +123,9 @@ def test_the_stated_rate_is_kept_in_steps_without_a_gap(gap, kept):
     steps = np.full(40, STEP)
     steps[10:12] = gap * STEP, (2 - gap) * STEP
     times = np.r_[0, np.cumsum(steps)]
-    if kept:
-        assert described(times, stated=50.0)["frame_rate"] == 50
-    else:
-        with pytest.warns(UserWarning, match="uneven"):
-            assert describe_times("a.trc", times, stated=50.0)["frame_rate"] is None
+    with nullcontext() if kept else pytest.warns(UserWarning, match="uneven"):
+        facts = describe_times("a.trc", times, stated=50.0)
+    assert facts["frame_rate"] == (50 if kept else None)
 
 
 def test_times_without_a_duration_have_the_stated_rate():
