@@ -17,13 +17,11 @@ def recording():
 
 
 def named(cosines, positions):
-    values = cosines.fit_transform([np.vstack([positions, positions])])[0][0]
-    names = cosines.get_feature_names_out()
-    return {
-        str(name)[:-2]: tuple(values[i : i + 3].round(9))
-        for i, name in enumerate(names)
-        if name.endswith("_x")
-    } | {"u": round(values[0], 9)}
+    """The height, and the cosines of each limb."""
+    height, *values = cosines.fit_transform(np.vstack([positions, positions]))[0].round(9)
+    limbs = [str(name)[:-2] for name in cosines.get_feature_names_out()[1::3]]
+    rows = np.reshape(values, (-1, 3)).tolist()
+    return {"u": height} | dict(zip(limbs, map(tuple, rows), strict=True))
 
 
 def test_cosines_of_a_known_body():
@@ -140,20 +138,15 @@ def test_inverse_transform_refuses_cosines_of_length_0_and_scales_others(recordi
 
 # -- names of columns ---------------------------------------------------------------------
 
-NAMES = Skeleton.paper().column_names
-
-
-def as_table(x, names=NAMES):
-    return pd.DataFrame(x, columns=names)
-
 
 def test_inverse_transform_refuses_wrong_order_of_columns(recording):
     cosines = DirectionCosines(Skeleton.paper()).set_output(transform="pandas")
-    table = cosines.fit_transform(as_table(recording))
+    names = Skeleton.paper().column_names
+    table = cosines.fit_transform(pd.DataFrame(recording, columns=names))
     expected = cosines.inverse_transform(np.asarray(table))
     # Its own output: without a warning, which would be an error here.
     np.testing.assert_array_equal(cosines.inverse_transform(table), expected)
-    np.testing.assert_array_equal(cosines.inverse_transform([table])[NAMES], expected)
+    np.testing.assert_array_equal(cosines.inverse_transform([table])[names], expected)
     for wrong in (table[table.columns[::-1]], table.add_prefix("my_")):
         for given in (wrong, [wrong], to_frame([wrong])):
             with pytest.raises(ValueError, match="names should match"):

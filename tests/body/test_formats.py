@@ -46,14 +46,10 @@ EXPECTED = {
 }  # fmt: skip
 
 
-def ready(name, **settings):
-    return getattr(Skeleton, name)(**settings)
-
-
 def embedded(name, n_dims=3):
     """A synthetic person as a format shows it: other joints lie at the neck."""
     (x,) = make_bending(1, random_state=1).data
-    skeleton = ready(name, n_dims=n_dims, up="y")
+    skeleton = getattr(Skeleton, name)(n_dims=n_dims, up="y")
     points = dict(zip(PAPER.joints, np.moveaxis(x.reshape(-1, 15, 3), 1, 0), strict=True))
     at = {j: points[n] for n, j in skeleton.landmarks.items() if isinstance(j, str)}
     joints = [at.get(j, points["neck"])[:, :n_dims] for j in skeleton.joints]
@@ -61,34 +57,25 @@ def embedded(name, n_dims=3):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_joints_and_landmarks(name):
+def test_joints_landmarks_axes_and_repr(name):
     assert name in EXPECTED, f"The format {name!r} lacks an entry in EXPECTED of {__file__}."
     count, places, up, landmarks = EXPECTED[name]
-    skeleton = ready(name)
+    skeleton = getattr(Skeleton, name)()
     assert (len(skeleton.joints), skeleton.up, skeleton.n_dims) == (count, up, 3)
     assert {j: skeleton.joints[j] for j in places} == places
     assert skeleton.landmarks == {**skeleton.landmarks, **landmarks}
     assert len(skeleton.limbs) == (11 if name == "opencap" else 12)
     assert skeleton.parents.count(-1) <= 3
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_repr_is_the_constructor(name):
-    for settings, called in (({}, ""), ({"n_dims": 2}, "n_dims=2")):
-        skeleton = ready(name, **settings)
-        assert repr(skeleton) == f"Skeleton.{name}({called})"
-        assert eval(repr(skeleton), {"Skeleton": Skeleton}) == skeleton
-    other = ready(name, up="-x")
+    picture, other = (getattr(Skeleton, name)(**each) for each in ({"n_dims": 2}, {"up": "-x"}))
+    assert (picture.joints, picture.landmarks) == (skeleton.joints, skeleton.landmarks)
+    assert picture.up == ("y" if name in ("paper", "acclaim") else "-y")
+    assert picture.column_names[:2] == [f"{skeleton.joints[0]}_x", f"{skeleton.joints[0]}_y"]
+    assert len(picture.column_names) == 2 * len(skeleton.joints)
     assert other.up == "-x"
+    # The repr is the constructor, where there is one.
+    assert repr(skeleton) == f"Skeleton.{name}()"
+    assert repr(picture) == f"Skeleton.{name}(n_dims=2)"
     assert repr(other).startswith("Skeleton(<")
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_up_is_downwards_in_pictures(name):
-    skeleton = ready(name, n_dims=2)
-    assert skeleton.up == ("y" if name in ("paper", "acclaim") else "-y")
-    assert skeleton.column_names[:2] == [f"{skeleton.joints[0]}_x", f"{skeleton.joints[0]}_y"]
-    assert len(skeleton.column_names) == 2 * len(skeleton.joints)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +88,7 @@ def test_up_is_downwards_in_pictures(name):
     ],
 )
 def test_landmarks_are_recognised_in_any_spelling_and_among_other_joints(name, spelling, n_dims):
-    known = ready(name, n_dims=n_dims)
+    known = getattr(Skeleton, name)(n_dims=n_dims)
     df = embedded(name, n_dims)
     names = [spelling(joint) for joint in known.joints]
     as_written = dict(zip(known.joints, names, strict=True))
@@ -122,7 +109,7 @@ def test_landmarks_are_recognised_in_any_spelling_and_among_other_joints(name, s
 def test_features_do_not_depend_on_the_format(name):
     (x,) = make_bending(1, random_state=1).data
     for kind in (DirectionCosines, JointPositions):
-        some = kind(ready(name, up="y")).set_output(transform="pandas")
+        some = kind(getattr(Skeleton, name)(up="y")).set_output(transform="pandas")
         expected = kind(PAPER).set_output(transform="pandas").fit_transform(x)
         found = some.fit_transform(embedded(name))
         # The synthetic people have their pelvis and neck in the middle, but for noise.
@@ -169,4 +156,4 @@ def test_landmarks_of_other_names_are_guessed(joints, landmarks):
 )
 def test_joints_and_parents_are_those_of_real_recordings(real_data, archive, name):
     bunch = load_trials(real_data / f"{archive}_positions.npz")
-    assert bunch.skeleton == ready(name)
+    assert bunch.skeleton == getattr(Skeleton, name)()

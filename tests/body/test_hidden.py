@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from sklearn.utils import get_tags
-from sklearn_motionsync import ASpace, DirectionCosines, JointPositions, Skeleton
+from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
 from sklearn_motionsync.body.axes import fill_heading, heading_axes
 from sklearn_motionsync.datasets import load_trials, make_bending
 
@@ -90,12 +90,10 @@ def test_limbs_with_a_hidden_end_are_nan_and_others_unchanged(reference, n_dims,
 
 def test_hidden_nan_without_gaps_equals_hidden_raise(recordings, fitted):
     for reference in REFERENCES:
-        plain = DirectionCosines(PAPER, reference).fit(recordings)
-        live = fitted(reference)
-        np.testing.assert_array_equal(live.limb_lengths_, plain.limb_lengths_)
-        a, b = plain.transform(recordings[0]), live.transform(recordings[0])
-        np.testing.assert_array_equal(a, b)
-        np.testing.assert_array_equal(plain.inverse_transform(a), live.inverse_transform(b))
+        plain, live = DirectionCosines(PAPER, reference).fit(recordings), fitted(reference)
+        poses = plain.transform(recordings[0])
+        np.testing.assert_array_equal(live.transform(recordings[0]), poses)
+        np.testing.assert_array_equal(live.inverse_transform(poses), plain.inverse_transform(poses))
 
 
 def test_mean_of_joints_is_hidden_with_any_of_them():
@@ -135,22 +133,24 @@ def turning(headings, twists):
     return np.concatenate(bodies)
 
 
-def test_shoulders_give_the_heading_with_the_last_seen_twist(fitted):
+def test_shoulders_give_the_heading_with_the_last_seen_twist_and_else_it_stays(fitted):
     x = turning([0, 10, 30, 50, 80, 90], [10, 20, 25, 30, -5, -5])
-    x = hide(x, [2, 3], "left_hip")
-    cosines = fitted()
-    angles = turn_of_x(limb(cosines, cosines.transform(x), "shoulder"))
+    cosines, shoulder = fitted(), hide(hide(x, [2, 3], "left_hip"), [3], "right_shoulder")
+    given = hide(x, [2, 3], "left_hip")
+    angles = turn_of_x(limb(cosines, cosines.transform(given), "shoulder"))
     np.testing.assert_allclose(angles, [10, 20, 20, 20, -5, -5], atol=1e-9)
     # The head is forward of the neck: its direction shows the estimated heading.
-    faces = turn_of_z(limb(cosines, cosines.transform(x), "neck"))
-    np.testing.assert_allclose(faces, [0, 0, -5, -10, 0, 0], atol=1e-9)
-
-
-def test_last_heading_stays_where_hips_and_shoulders_are_hidden(fitted):
-    x = turning([0, 10, 40, 50], [0, 0, 0, 0])
-    x = hide(x, [2], "left_hip", "right_shoulder")
-    cosines = fitted()
-    faces = turn_of_z(limb(cosines, cosines.transform(x), "neck"))
+    for seen, expected in ((given, [0, 0, -5, -10, 0, 0]), (shoulder, [0, 0, -5, 15, 0, 0])):
+        faces = turn_of_z(limb(cosines, cosines.transform(seen), "neck"))
+        np.testing.assert_allclose(faces, expected, atol=1e-9)
+    # Of a body without hips the heading is that of its shoulders.
+    names = [name for name in JOINTS if "hip" not in name and "knee" not in name]
+    trunk = Skeleton(names, [-1] * len(names), {name: name for name in names})
+    x = turning([0, 30, 60, 90], [0] * 4).reshape(4, 15, 3)
+    x = x[:, [JOINTS.index(name) for name in names]]
+    cosines = DirectionCosines(trunk, hidden="nan").fit(x.reshape(4, -1))
+    x[2, names.index("left_shoulder")] = np.nan
+    faces = turn_of_z(limb(cosines, cosines.transform(x.reshape(4, -1)), "neck"))
     np.testing.assert_allclose(faces, [0, 0, 30, 0], atol=1e-9)
 
 
@@ -165,7 +165,7 @@ def test_hips_stay_at_the_pelvis_where_no_ankle_is_seen(recordings, fitted):
     np.testing.assert_allclose((left + right) / 2, pelvis, atol=1e-12)
 
 
-@pytest.mark.parametrize("size", [0, 1e-9, 1e-12])
+@pytest.mark.parametrize("size", [0, 1e-9])
 def test_vertical_hips_show_no_heading(size):
     """What is left of them across is rounding: the heading before them stays, not that."""
     hips = np.array([[0.6, 0, 0.8], [-size, 1, size], [np.nan] * 3])
@@ -182,9 +182,8 @@ def test_limbs_before_the_first_heading_are_nan(fitted):
     poses = cosines.transform(x)
     assert np.isfinite(poses[:, 0]).all()
     # Without hips so far, as of a body that has none.
-    np.testing.assert_allclose(
-        turn_of_x(limb(cosines, poses, "shoulder"))[1:], [0, 15, 15], atol=1e-9
-    )
+    angles = turn_of_x(limb(cosines, poses, "shoulder"))
+    np.testing.assert_allclose(angles[1:], [0, 15, 15], atol=1e-9)
     assert np.isfinite(limb(fitted("world"), fitted("world").transform(x), "neck")).all()
 
 
@@ -241,12 +240,9 @@ def test_hidden_joints_are_refused_unless_allowed(recordings, fitted):
         plain.inverse_transform(fitted().transform([x]))
     with pytest.raises(ValueError, match=r"Trial 0, frame 3, .* is NaN.*Set hidden='nan'"):
         JointPositions(PAPER).fit(recordings).transform([x])
-    points = ASpace().fit(plain.transform(recordings)).transform(fitted().transform([x]))
-    assert np.isfinite(points[0]).all()
     for kind in (DirectionCosines, JointPositions):
-        for hidden, allowed in (("nan", True), ("raise", False)):
-            tags = get_tags(kind(PAPER, hidden=hidden))
-            assert tags.input_tags.allow_nan is allowed
+        assert get_tags(kind(PAPER, hidden="nan")).input_tags.allow_nan
+        assert not get_tags(kind(PAPER)).input_tags.allow_nan
         with pytest.raises(ValueError, match="The 'hidden' parameter"):
             kind(PAPER, hidden="drop").fit(recordings)
 
@@ -317,18 +313,6 @@ def test_everything_may_be_hidden_in_transform_and_not_in_fit(recordings, fitted
     np.testing.assert_array_equal(cosines.fit([nothing, tiny]).limb_lengths_, lengths)
 
 
-def test_body_without_hips_keeps_the_heading_of_its_shoulders():
-    names = [name for name in JOINTS if "hip" not in name and "knee" not in name]
-    trunk = Skeleton(names, [-1] * len(names), {name: name for name in names})
-    x = turning([0, 30, 60, 90], [0] * 4).reshape(4, 15, 3)
-    x = x[:, [JOINTS.index(name) for name in names]]
-    cosines = DirectionCosines(trunk, hidden="nan").fit(x.reshape(4, -1))
-    x[2, names.index("left_shoulder")] = np.nan
-    poses = cosines.transform(x.reshape(4, -1))
-    faces = turn_of_z(limb(cosines, poses, "neck"))
-    np.testing.assert_allclose(faces, [0, 0, 30, 0], atol=1e-9)
-
-
 # -- inverse_transform --------------------------------------------------------------------
 
 
@@ -389,7 +373,7 @@ def test_position_matrix_refuses_parent_axes(fitted):
 def test_shoulders_halve_the_error_of_the_heading_of_turning_people(real_data):
     """Joggers in a circle, hips hidden for a second, against the last heading."""
     bunch = load_trials(real_data / "hdm05" / "hdm05_positions.npz")
-    errors = {"shoulders": [], "held": []}
+    errors = [], []
     for i in np.flatnonzero(bunch.target == "jogLeftCircle4StepsRstart"):
         x = bunch.data[i].astype(float).reshape(len(bunch.data[i]), -1, 3)
         hips, shoulders = (across(x, bunch.skeleton, part) for part in ("hip", "shoulder"))
@@ -398,13 +382,11 @@ def test_shoulders_halve_the_error_of_the_heading_of_turning_people(real_data):
             gap = slice(start, start + 120)
             lost = hips.copy()
             lost[gap] = np.nan
-            for name, found in (
-                ("shoulders", heading_axes(fill_heading(lost, shoulders))),
-                ("held", heading_axes(fill_heading(lost))),
-            ):
-                cosines = np.clip((true * found[:, 0]).sum(axis=1), -1, 1)
-                errors[name].append(np.rad2deg(np.arccos(cosines))[gap])
-    error, held = (np.quantile(np.concatenate(e), 0.9) for e in errors.values())
+            for each, given in zip(errors, ([lost, shoulders], [lost]), strict=True):
+                found = heading_axes(fill_heading(*given))[:, 0]
+                cosines = np.clip((true * found).sum(axis=1), -1, 1)
+                each.append(np.rad2deg(np.arccos(cosines))[gap])
+    error, held = (np.quantile(np.concatenate(each), 0.9) for each in errors)
     assert error < 0.5 * held
     assert error < 25
 

@@ -98,12 +98,11 @@ def test_landmarks_and_feet_of_marker_sets(name, prefix, seed):
 
 def test_markers_that_were_taken_off_after_a_static_trial_stand_for_nothing():
     names = [f"{s}{m}" for s in "LR" for m in ("ASI", "KNE", "KNM", "ANK", "MED")]
-    df = pd.DataFrame(np.random.default_rng(0).random((9, 30)),
-                      columns=[f"{name}_{a}" for name in names for a in "xyz"])  # fmt: skip
-    assert Skeleton.from_frame(df, up="z", landmarks={"neck": None}).landmarks["left_knee"] == (
-        "LKNE", "LKNM")  # fmt: skip
+    columns = [f"{name}_{axis}" for name in names for axis in "xyz"]
+    df = pd.DataFrame(np.random.default_rng(0).random((9, 30)), columns=columns)
+    assert Skeleton.from_frame(df, up="z").landmarks["left_knee"] == ("LKNE", "LKNM")
     df.loc[:, df.columns.str.contains("KNM|MED")] = np.nan
-    landmarks = Skeleton.from_frame(df, up="z", landmarks={"neck": None}).landmarks
+    landmarks = Skeleton.from_frame(df, up="z").landmarks
     assert (landmarks["left_knee"], landmarks["right_ankle"]) == ("LKNE", "RANK")
 
 
@@ -131,17 +130,14 @@ def test_missing_landmarks_are_named_with_the_nearest_guess():
 
 def test_sides_that_positions_contradict_are_warned_of():
     bends = make_bending(1, random_state=0)
-    at = {"hip": "ASI", "knee": "KNE", "ankle": "ANK"}
-    names = {
-        f"{side}_{part}": side[0].upper() + at[part] for side in ("left", "right") for part in at
-    }
-    joints = list(bends.skeleton.joints)
-    x = bends.data[0].reshape(len(bends.data[0]), -1, 3)[:, [joints.index(name) for name in names]]
-    columns = [f"{name}_{axis}" for name in names.values() for axis in "xyz"]
-    right = Skeleton.from_frame(pd.DataFrame(x.reshape(len(x), -1), columns=columns))
-    assert right.landmarks["left_knee"] == "LKNE"
-    x[:, [1, 4]] = x[:, [4, 1]]
-    with pytest.warns(
-        UserWarning, match="Left and right may be exchanged: of .*'left_knee': 'LKNE'"
-    ):
-        Skeleton.from_frame(pd.DataFrame(x.reshape(len(x), -1), columns=columns))
+    df, knees = pd.DataFrame(), []
+    x = bends.data[0].reshape(len(bends.data[0]), -1, 3)
+    for side in ("left", "right"):
+        for part, marker in (("hip", "ASI"), ("knee", "KNE"), ("ankle", "ANK")):
+            names = [f"{side[0].upper()}{marker}_{axis}" for axis in "xyz"]
+            df[names] = x[:, bends.skeleton.index_of(f"{side}_{part}")]
+        knees += [f"{side[0].upper()}KNE_{axis}" for axis in "xyz"]
+    assert Skeleton.from_frame(df).landmarks["left_knee"] == "LKNE"
+    df[knees] = df[knees[3:] + knees[:3]].to_numpy()
+    with pytest.warns(UserWarning, match="Left and right may be exchanged: of .*'left_knee': 'LK"):
+        Skeleton.from_frame(df)

@@ -3,11 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import (
-    DirectionCosines,
-    JointPositions,
-    Skeleton,
-)
+from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
 from sklearn_motionsync.datasets import make_bending
 
 from made_bodies import columns_of, standing, turned
@@ -38,36 +34,27 @@ def people():
     return people
 
 
-def in_plane(names):
-    return [not name.endswith("_z") for name in names]
-
-
-@pytest.mark.parametrize("reference", REFERENCES)
-def test_cosines_equal_those_of_a_body_that_moves_in_a_plane(people, reference):
-    space = DirectionCosines(PAPER, reference).fit(people)
-    plane = DirectionCosines(PLANE, reference).fit([picture_of(x) for x in people])
+@pytest.mark.parametrize(
+    ("kind", "reference"),
+    [
+        *((DirectionCosines, reference) for reference in REFERENCES),
+        *((JointPositions, reference) for reference in ("heading", "world")),
+    ],
+)
+def test_features_equal_those_of_a_body_that_moves_in_a_plane(people, kind, reference):
+    seen = [picture_of(x) for x in people]
+    space, plane = kind(PAPER, reference).fit(people), kind(PLANE, reference).fit(seen)
     names = space.get_feature_names_out()
-    columns = in_plane(names)
-    assert list(plane.get_feature_names_out()) == [n for n in names if not n.endswith("_z")]
-    np.testing.assert_allclose(plane.limb_lengths_, space.limb_lengths_, rtol=1e-12)
-    for x in people:
-        (found,) = plane.transform([picture_of(x)])
-        np.testing.assert_allclose(found, space.transform([x])[0][:, columns], atol=1e-9)
-        np.testing.assert_allclose(
-            plane.inverse_transform([found])[0],
-            picture_of(space.inverse_transform(space.transform([x]))[0]),
-            atol=1e-9,
-        )
-
-
-@pytest.mark.parametrize("reference", ["heading", "world"])
-def test_positions_equal_those_of_a_body_that_moves_in_a_plane(people, reference):
-    space, plane = JointPositions(PAPER, reference), JointPositions(PLANE, reference)
-    names = space.fit(people).get_feature_names_out()
-    assert list(plane.get_feature_names_out()) == [n for n in names if not n.endswith("_z")]
-    for x in people:
-        found = plane.fit_transform([picture_of(x)])[0]
-        np.testing.assert_allclose(found, space.transform([x])[0][:, in_plane(names)], atol=1e-12)
+    columns = [not name.endswith("_z") for name in names]
+    assert list(plane.get_feature_names_out()) == list(names[columns])
+    poses, found = space.transform(people), plane.transform(seen)
+    for a, b in zip(found, poses, strict=True):
+        np.testing.assert_allclose(a, b[:, columns], atol=1e-9)
+    if kind is DirectionCosines:
+        np.testing.assert_allclose(plane.limb_lengths_, space.limb_lengths_, rtol=1e-12)
+        back, expected = plane.inverse_transform(found), space.inverse_transform(poses)
+        for a, b in zip(back, expected, strict=True):
+            np.testing.assert_allclose(a, picture_of(b), atol=1e-9)
 
 
 @pytest.mark.parametrize("reference", REFERENCES)

@@ -54,10 +54,8 @@ def test_positions_of_any_form_are_the_same_positions(form):
             assert a.columns.equals(x.columns)
         else:
             np.testing.assert_array_equal(a, expected)
-    shown = SkeletonDisplay.from_trials(given, SKELETON)
-    for a, b in zip(
-        shown.scenes[0], SkeletonDisplay.from_trials(X, SKELETON).scenes[0], strict=True
-    ):
+    shown, expected = (SkeletonDisplay.from_trials(each, SKELETON) for each in (given, X))
+    for a, b in zip(shown.scenes[0], expected.scenes[0], strict=True):
         np.testing.assert_array_equal(a, b)
 
 
@@ -93,9 +91,8 @@ def test_gait_events_of_any_form():
     expected = gait_events(x, walk.skeleton, frame_rate=walk.frame_rate)
     assert len(expected)
     levels = pd.MultiIndex.from_product([["net"], joints, ["x", "y", "z", "likelihood"]])
-    for given in (
-        spelt(x, "{} {X}", joints), with_quality(x, len(joints), levels), x.reshape(len(x), -1, 3)
-    ):  # fmt: skip
+    whole = spelt(x, "{} {X}", joints), x.reshape(len(x), -1, 3)
+    for given in (*whole, with_quality(x, len(joints), levels)):
         found = gait_events(given, walk.skeleton, frame_rate=walk.frame_rate)
         pd.testing.assert_frame_equal(found, expected)
     found = gait_events(spelt(x, "Ann:{}_{X}", joints), frame_rate=walk.frame_rate)
@@ -115,24 +112,17 @@ def test_trials_that_were_checked_stay_as_they_are():
     assert plain_positions(checked, SKELETON) is checked
 
 
-def test_stacks_of_arrays_of_joints():
+def test_stacks_of_arrays_of_joints_are_taken_where_a_skeleton_tells_that_they_fit():
     stack = np.stack([x[:40] for x in X])
     joints = stack.reshape(*stack.shape[:2], -1, 3)
-    found = DirectionCosines(SKELETON).fit_transform(joints)
-    np.testing.assert_array_equal(found, DirectionCosines(SKELETON).fit_transform(stack))
-    np.testing.assert_array_equal(
-        mirror(joints, SKELETON).reshape(stack.shape), mirror(stack, SKELETON)
-    )
-
-
-def test_arrays_of_joints_are_refused_where_nothing_tells_that_they_fit():
-    joints = [x.reshape(len(x), -1, 3) for x in X]
-    with pytest.raises(ValueError, match=r"x\.reshape\(len\(x\), -1\)"):
-        DenseSynchronizer(20).fit(joints)
-    with pytest.raises(ValueError, match=r"x\.reshape\(len\(x\), -1\)"):
-        DenseSynchronizer(20).fit(np.stack([x[:40] for x in joints]))
-    with pytest.raises(ValueError, match=r"x\.reshape\(len\(x\), -1\)"):
-        DirectionCosines(SKELETON).fit([x[:, 1:] for x in joints])
+    cosines = DirectionCosines(SKELETON)
+    np.testing.assert_array_equal(cosines.fit_transform(joints), cosines.fit_transform(stack))
+    image = mirror(joints, SKELETON)
+    np.testing.assert_array_equal(image.reshape(stack.shape), mirror(stack, SKELETON))
+    refused = (DenseSynchronizer(20), [*joints]), (DenseSynchronizer(20), joints)
+    for estimator, given in (*refused, (cosines, [x[:, 1:] for x in joints])):
+        with pytest.raises(ValueError, match=r"x\.reshape\(len\(x\), -1\)"):
+            estimator.fit(given)
 
 
 def test_columns_that_are_no_positions_are_named():
