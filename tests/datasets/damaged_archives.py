@@ -9,6 +9,8 @@ import zlib
 import numpy as np
 from sklearn_motionsync import Skeleton
 
+from motion_files import npy
+
 
 def fields():
     kinect = Skeleton.kinect()
@@ -41,21 +43,17 @@ def make_archives():
     return contents
 
 
-def npy(values, header=None):
-    """An array as NumPy writes it, or with another header."""
-    file = io.BytesIO()
-    np.save(file, values)
-    if header is None:
-        return file.getvalue()
+def with_header(values, header):
+    """An array as NumPy writes it, with another header."""
     header = header.encode("latin-1") + b"\n"
     content = np.ascontiguousarray(values).tobytes()
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + content
 
 
-def archive(path, compression=zipfile.ZIP_STORED, **members):
+def archive(path, **members):
     """An archive of the fields, some of them replaced by the bytes of a member."""
-    contents = {name: npy(np.asarray(values)) for name, values in fields().items()} | members
-    with zipfile.ZipFile(path, "w", compression) as file:
+    contents = {name: npy(values) for name, values in fields().items()} | members
+    with zipfile.ZipFile(path, "w") as file:
         for name, content in contents.items():
             file.writestr(f"{name}.npy", content)
     return path

@@ -10,7 +10,8 @@ from sklearn_motionsync import Skeleton
 from sklearn_motionsync.datasets import load_trials
 
 import fuzz_readers
-from damaged_archives import archive, fields, make_archives, npy
+from damaged_archives import archive, fields, make_archives, with_header
+from motion_files import npy
 
 
 def replaced(name, place, value, dtype=None):
@@ -61,26 +62,19 @@ def test_compression_order_and_types_do_not_matter(tmp_path):
         ({"offsets": None}, r"lacks \['offsets'\]"),
         ({"positions": np.zeros((12, 60))}, r"must be floats of shape \(frames, joints, 3\)"),
         ({"positions": np.zeros((12, 20, 3), int)}, "must be floats"),
-        ({"positions": np.zeros((12, 0, 3))}, r"must be floats of shape .*\(12, 0, 3\)"),
         ({"offsets": [0, 5, 11]}, "offsets must increase from 0 to the 12 frames"),
         ({"offsets": [0, 11, 12]}, "by at least 2 for each trial"),
-        ({"offsets": [0, -3, 12]}, "offsets must increase"),
         ({"offsets": [0.0, 5.0, 12.0]}, "whole numbers"),
         # Differences of unsigned numbers are never negative.
         *(({"offsets": np.array([0, 12, 5, 12], t)}, "offsets must inc") for t in ("u1", "u8")),
         ({"offsets": np.array([0, 2**63 - 1, 2**64 - 2, 12], "u8")}, "offsets must increase"),
         ({"label": ["bow"]}, r"label must have shape \(2,\), got \(1,\)"),
         ({"label": np.array([{}, {}], dtype=object)}, "cannot be read as a NumPy .npz archive"),
-        (
-            replaced("positions", (7, 0, 1), np.nan),
-            r"trial 1, frame 2, .*HipCenter_y'\) is N",
-        ),
-        (replaced("positions", (7, 0, 1), -np.inf), "trial 1, frame 2, .* is infinity"),
+        (replaced("positions", (7, 0, 1), np.nan), r"trial 1, frame 2, .*HipCenter_y'\) is N"),
         *(
             (replaced("parents", 1, parent, float), "parents must be indices of joints, whole num")
             for parent in (0.5, np.nan, 20, -2, 2**40)
         ),
-        ({"parents": ["0"] * 20}, "parents must be indices"),
         (replaced("parents", 1, 2), "lead to a root .*, but from joint 'Spine' they form a cyc"),
         ({"joints": ["a"] * 2 + list("bcdefghijklmnopqrs")}, r"different names, got \['a', 'a'"),
         ({"joints": np.arange(20)}, "joints must be text, got int64"),
@@ -137,19 +131,16 @@ HEADERS = [
 
 @pytest.mark.parametrize("header", HEADERS, ids=range(len(HEADERS)))
 def test_wrong_headers_are_refused(tmp_path, header):
-    path = archive(tmp_path / "a.npz", positions=npy(fields()["positions"], header))
+    path = archive(tmp_path / "a.npz", positions=with_header(fields()["positions"], header))
     with pytest.raises(ValueError, match=r"a\.npz") as caught:
         load_trials(path)
     assert type(caught.value) is ValueError
-    assert str(caught.value).startswith(str(path))
     assert len(str(caught.value)) < 500 + len(str(path))
 
 
 def test_archives_that_unpack_to_very_much_are_refused_before(tmp_path):
-    path = tmp_path / "a.npz"
-    shape = (40_000, 100, 3)
-    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}"
-    zeros = npy(np.zeros(0), header)
+    path, shape = tmp_path / "a.npz", (40_000, 100, 3)
+    zeros = with_header(np.zeros(0), SHAPE.replace("<f4", "<f8").format(shape))
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         for name, values in fields().items():
             with file.open(f"{name}.npy", "w", force_zip64=True) as member:

@@ -104,9 +104,8 @@ def test_timing_keeps_poses_and_amplitude_keeps_times():
 
 @pytest.mark.parametrize(("timing", "amplitude"), [(4, 0), (-12, -40), (12, 40)])
 def test_group_curves_and_group_times_are_those_of_the_data(timing, amplitude):
-    gait = make_gait(
-        2, 1, timing=timing, amplitude=amplitude, style=0, warp=0, noise=0, random_state=0
-    )
+    same = {"style": 0, "warp": 0, "noise": 0, "random_state": 0}
+    gait = make_gait(2, 1, timing=timing, amplitude=amplitude, **same)
     moments = np.linspace(0, 1, 101)
     for i in range(2):
         share = np.interp(moments, gait.times[i], np.linspace(0, 1, len(gait.times[i])))
@@ -165,21 +164,15 @@ def test_takes_and_cycles_show_the_same_people(gait, takes):
 
 
 def test_random_state_makes_people_reproducible():
-    a, b, c = (make_gait(2, random_state=seed) for seed in (0, 0, 1))
+    a, b, c = (make_gait(2, random_state=seed) for seed in (0, np.random.RandomState(0), 1))
     np.testing.assert_array_equal(a.data[1], b.data[1])
     assert a.data[1].shape != c.data[1].shape or not np.allclose(a.data[1], c.data[1])
-    again = make_gait(2, random_state=np.random.RandomState(0))
-    np.testing.assert_array_equal(again.data[1], a.data[1])
 
 
 @pytest.mark.parametrize("takes", [False, True])
 def test_smallest_and_largest_parameters_give_finite_cycles(takes):
-    for params in (
-        {"n_people": 1, "n_cycles": 1, "n_frames": 20},
-        {"warp": 10, "timing": 12},
-        {"noise": 1000},
-        {"style": 100, "amplitude": -40},
-    ):
+    largest = {"warp": 10, "timing": 12, "noise": 1000, "style": 100, "amplitude": -40}
+    for params in ({"n_people": 1, "n_cycles": 1, "n_frames": 20}, largest):
         gait = make_gait(**{"n_people": 3, "takes": takes, "random_state": 0} | params)
         for x, times, keyframes in zip(gait.data, gait.times, gait.keyframes, strict=True):
             assert np.isfinite(x).all()

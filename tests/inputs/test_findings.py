@@ -2,7 +2,6 @@
 
 import re
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,6 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import load_trials, make_bending, make_gait, make_walk
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 GAIT = [np.asarray(x) for x in make_gait(timing=6, random_state=0).data]
 BENDS = [np.asarray(x) for x in make_bending(8, random_state=0).data]
 
@@ -130,28 +128,21 @@ def test_nothing_of_made_movement(trials):
     assert check_trials(trials).empty
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="no recordings of people beside the checkout")
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
-def test_recordings_of_people_have_few_findings(name):
+def test_recordings_of_people_have_few_findings(real_data, name):
     """The end of one clip repeats its pose in the file; nothing else is found."""
-    bunch = load_trials(SHARED / f"{name}_positions.npz")
-    kinds = []
+    bunch, kinds = load_trials(real_data / f"{name}_positions.npz"), []
     for label in np.unique(bunch.target):
-        trials = [
-            np.asarray(x) for x, y in zip(bunch.data, bunch.target, strict=True) if y == label
-        ]
+        trials = [bunch.data[i] for i in np.flatnonzero(bunch.target == label)]
         kinds += check_trials(trials)["kind"].tolist()
     assert kinds == ["held at the end"] * (name == "hdm05/hdm05")
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="no recordings of people beside the checkout")
-def test_markers_at_zero_in_a_public_set_are_fill_values():
+def test_markers_at_zero_in_a_public_set_are_fill_values(real_data):
     """UI-PRMD writes 0, 0, 0 for a marker that was not seen; what is found is nothing else."""
-    with np.load(SHARED / "uiprmd" / "uiprmd_odd_positions.npz") as z:
-        positions, offsets, labels = z["positions"], z["offsets"], z["label"]
-    squats = [
-        positions[offsets[i] : offsets[i + 1]] for i in np.flatnonzero(labels == "deep squat")
-    ]
+    with np.load(real_data / "uiprmd" / "uiprmd_odd_positions.npz") as z:
+        takes, labels = np.split(z["positions"], z["offsets"][1:-1]), z["label"]
+    squats = [takes[i] for i in np.flatnonzero(labels == "deep squat")]
     table = check_trials([x.reshape(len(x), -1) for x in squats])
     assert set(table["kind"]) == {"fill value"}
     for _, row in table.iterrows():
@@ -196,12 +187,10 @@ def test_what_was_mended_has_no_finding(name):
         turns = np.concatenate([(a - b)[:, WIDTH] for a, b in zip(mended, trials, strict=True)])
         np.testing.assert_allclose(turns / 360, np.rint(turns / 360), atol=1e-9)
     if name == "quaternion":
-        for a, b in zip(mended, trials, strict=True):
-            np.testing.assert_allclose(
-                Rotation.from_quat(a[:, WIDTH:]).as_matrix(),
-                Rotation.from_quat(b[:, WIDTH:]).as_matrix(),
-                atol=1e-12,
-            )
+        # Nor is another rotation meant.
+        for pair in zip(mended, trials, strict=True):
+            turns = [Rotation.from_quat(x[:, WIDTH:]).as_matrix() for x in pair]
+            np.testing.assert_allclose(*turns, atol=1e-12)
     if name == "fill value":
         assert np.isnan(mended[2][20:30, 3:6]).all()
     if name == "zeros at the end":
@@ -210,9 +199,8 @@ def test_what_was_mended_has_no_finding(name):
 
 def test_means_of_mended_angles_are_those_of_angles_that_do_not_wrap():
     aligned = DenseSynchronizer(51).fit_transform(mend_trials(MADE["wrapping"][0]))
-    truth = DenseSynchronizer(51).fit_transform(
-        beside(lambda t, i: 170 + (25 + i % 3) * np.sin(np.pi * t))
-    )
+    unwrapped = beside(lambda t, i: 170 + (25 + i % 3) * np.sin(np.pi * t))
+    truth = DenseSynchronizer(51).fit_transform(unwrapped)
     np.testing.assert_allclose((aligned - truth)[..., WIDTH] % 360 % 359.999, 0, atol=1e-3)
 
 

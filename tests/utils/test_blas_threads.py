@@ -67,19 +67,16 @@ def test_the_first_thread_may_still_run_when_the_last_restores_the_limit(found):
     assert blas_threads() == found
 
 
-def test_contexts_may_be_nested(found):
+def test_contexts_may_be_nested_and_end_by_an_error(found):
     with one_blas_thread():
-        with one_blas_thread():
+        for error in (KeyboardInterrupt, ValueError):
+            with pytest.raises(error), one_blas_thread():
+                raise error
             assert set(blas_threads().values()) == {1}
-        assert set(blas_threads().values()) == {1}
     assert blas_threads() == found
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
-def test_an_error_restores_the_limit(found, error):
-    with pytest.raises(error), one_blas_thread():
-        raise error
-    assert blas_threads() == found
+    # Other threads can set threads afterwards.
+    in_thread(threadpoolctl.threadpool_limits, 3, "blas")
+    assert set(blas_threads().values()) == {3}
 
 
 def test_portions_run_on_one_thread_under_limits_of_the_user(found):
@@ -90,10 +87,3 @@ def test_portions_run_on_one_thread_under_limits_of_the_user(found):
         assert set(blas_threads().values()) == {3}
     assert {n for threads in seen for n in threads.values()} == {1}
     assert blas_threads() == found
-
-
-def test_other_threads_can_set_threads_afterwards(found):
-    with one_blas_thread():
-        pass
-    in_thread(threadpoolctl.threadpool_limits, 3, "blas")
-    assert set(blas_threads().values()) == {3}

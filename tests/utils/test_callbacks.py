@@ -156,9 +156,7 @@ def test_all_steps_of_a_pipeline_take_callbacks():
     make_pipeline(*steps).set_callbacks(recorder).fit(make_trials(6))
     names = {context.estimator_name for _, context in recorder.contexts}
     assert names == {"Pipeline", *(type(step).__name__ for step in steps)}
-
-
-def test_a_transformer_without_callbacks_is_a_task_like_any_other():
+    # What cannot take them is a task like any other.
     recorder = Propagating()
     FrameWise(FunctionTransformer()).set_callbacks(recorder).fit(make_trials(3))
     tasks = [context.task_name for hook, context in recorder.contexts if hook == "end"]

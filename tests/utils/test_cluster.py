@@ -118,15 +118,10 @@ def test_fit_sends_trials_to_every_worker_once(client, shape):
     assert sent.sum() <= 1.5 * N_WORKERS * X.nbytes
 
 
-@pytest.fixture
-def no_garbage_collection():
+def test_busy_workers_keep_no_data_after_a_fit(client, request):
+    """Also where no garbage is collected."""
     gc.disable()
-    yield
-    gc.enable()
-
-
-@pytest.mark.usefixtures("no_garbage_collection")
-def test_busy_workers_keep_no_data_after_a_fit(client):
+    request.addfinalizer(gc.enable)
     X = walks(60, 40, 4)
     busy = [client.submit(time.sleep, 1.5, workers=[w], pure=False) for w in client.nthreads()]
     with joblib.parallel_config(backend="dask"):
@@ -136,11 +131,8 @@ def test_busy_workers_keep_no_data_after_a_fit(client):
     assert os.getpid() not in {pid for pid, _ in loaded.values()}
     assert all(matching for _, matching in loaded.values())
 
-    def has_data(dask_worker):
-        return len(dask_worker.data) > 0
-
     # The workers release data after a moment.
-    wait_until(lambda: not any(client.run(has_data).values()))
+    wait_until(lambda: not any(client.run(lambda dask_worker: len(dask_worker.data)).values()))
 
 
 def test_warping_sends_every_trial_to_one_worker(client):
@@ -186,9 +178,8 @@ def expected(fitted, portions_of_walks):
     return [stream_files.answer(fitted, "transform", each) for each in portions_of_walks]
 
 
-def test_stream_sends_model_once_and_portions_to_one_worker(
-    client, fitted, portions_of_walks, expected
-):
+def test_stream_sends_model_and_portions_once(client, fitted, portions_of_walks, expected):
+    """The model to every worker, a portion to one."""
     data = sum(portion.nbytes for portion in portions_of_walks)
     with distributed.get_task_stream(client) as tasks:
         before = received(client)
@@ -201,32 +192,23 @@ def test_stream_sends_model_once_and_portions_to_one_worker(
     assert len({task["worker"] for task in tasks.data}) == N_WORKERS
 
 
-@pytest.fixture
-def files(fitted, portions_of_walks, tmp_path):
-    """The model, a folder of portions, and one for results."""
+def test_files_are_sent_by_the_script(
+    client, fitted, portions_of_walks, expected, capsys, tmp_path
+):
     (tmp_path / "walks").mkdir()
     joblib.dump(fitted, tmp_path / "model.joblib")
-    for i, portion in enumerate(portions_of_walks[:4]):
+    for i, portion in enumerate([*portions_of_walks[:4], np.full((2, 60, 8), np.nan)]):
         np.save(tmp_path / "walks" / f"{i}.npy", portion)
-    return tmp_path / "model.joblib", tmp_path / "walks", tmp_path / "warped"
-
-
-def assert_warped(folder, expected):
-    for i, each in enumerate(expected[:4]):
-        assert np.load(folder / f"{i}.npy").tobytes() == each.tobytes()
-
-
-def test_files_are_sent_by_the_script(client, files, expected, capsys):
-    np.save(files[1] / "4.npy", np.full((2, 60, 8), np.nan))
-    arguments = [*map(str, files), "--scheduler", client.scheduler.address]
+    files = [str(tmp_path / name) for name in ("model.joblib", "walks", "warped")]
+    arguments = [*files, "--scheduler", client.scheduler.address]
     assert re.match(r".*4\.npy: Trial 0.*NaN", stream_dask.main(arguments), re.DOTALL)
     assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
-    assert_warped(files[2], expected)
-    (files[1] / "4.npy").unlink()
-    (files[2] / "2.npy").unlink()
+    (tmp_path / "walks" / "4.npy").unlink()
+    (tmp_path / "warped" / "2.npy").unlink()
     assert stream_dask.main(arguments) is None
     assert capsys.readouterr().out == "2.npy: done\n"
-    assert_warped(files[2], expected)
+    for i, each in enumerate(expected[:4]):
+        assert np.load(tmp_path / "warped" / f"{i}.npy").tobytes() == each.tobytes()
 
 
 def test_killed_worker_changes_no_bit(client, fitted, portions_of_walks, expected):
@@ -240,8 +222,7 @@ def test_killed_worker_changes_no_bit(client, fitted, portions_of_walks, expecte
     # The worker that replaces it has the model, too.
     wait_until(lambda: set(client.nthreads()) - workers)
     client.wait_for_workers(N_WORKERS, timeout=60)
+    call = stream_dask.on_worker, portions_of_walks[0]
     for worker in client.nthreads():
-        task = client.submit(
-            stream_dask.on_worker, portions_of_walks[0], workers=[worker], pure=False
-        )
+        task = client.submit(*call, workers=[worker], pure=False)
         assert task.result().tobytes() == expected[0].tobytes()

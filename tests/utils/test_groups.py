@@ -17,11 +17,7 @@ from sklearn_motionsync import (
     PartSynchronizer,
 )
 from sklearn_motionsync.comparison import compare_events, compare_groups, compare_to_norm
-from sklearn_motionsync.display import (
-    GroupDisplay,
-    LagDisplay,
-    SynchronizationDisplay,
-)
+from sklearn_motionsync.display import GroupDisplay, LagDisplay, SynchronizationDisplay
 from sklearn_motionsync.live import MotionTracker
 from sklearn_motionsync.report import write_report
 from sklearn_motionsync.takes import find_trials
@@ -35,6 +31,7 @@ PARTS = PartSynchronizer({"arm": [0]}, synchronizer=DenseSynchronizer(10)).fit(X
 SYNC = LinearSynchronizer(10).fit(X)
 PIPE = make_pipeline(LinearSynchronizer(10), ActionModel()).fit(X)
 EVENTS = [[k + 3, 15] for k in range(N)]
+Y, FEW = [0, 0, 0, 1, 1, 1], {"n_permutations": 19}
 
 
 def first_of(labels):
@@ -44,6 +41,11 @@ def first_of(labels):
 def report(**given):
     with TemporaryDirectory() as folder:
         write_report(Path(folder) / "report.html", SYNC, X, **given)
+
+
+def shown(display, estimator, name):
+    """The call of a display with labels, which needs no two of them."""
+    return lambda labels: display.from_estimator(estimator, X, **{name: labels}), False
 
 
 # What each method does with groups of the N trials; whether it needs two of them.
@@ -58,43 +60,19 @@ METHODS = {
     "ActionClassifier.fit(y)": (lambda y: ActionClassifier(n_frames=10).fit(X, y), True),
     "MotionTracker.fit(groups)": (lambda g: MotionTracker(SYNC, 20).fit(X, groups=g), True),
     "PartSynchronizer.lags(groups)": (lambda g: PARTS.lags(X, groups=g), False),
-    "compare_events(y)": (
-        lambda g: compare_events(X, EVENTS, g, n_permutations=19),
-        True,
-    ),
-    "compare_events(groups)": (
-        lambda p: compare_events(X, EVENTS, [0, 0, 0, 1, 1, 1], groups=p, n_permutations=19),
-        True,
-    ),
-    "compare_groups(y)": (lambda g: compare_groups(SYNC, X, g, n_permutations=19), True),
-    "compare_groups(groups)": (
-        lambda p: compare_groups(SYNC, X, [0, 0, 0, 1, 1, 1], groups=p, n_permutations=19),
-        True,
-    ),
+    "compare_events(y)": (lambda g: compare_events(X, EVENTS, g, **FEW), True),
+    "compare_events(groups)": (lambda p: compare_events(X, EVENTS, Y, groups=p, **FEW), True),
+    "compare_groups(y)": (lambda g: compare_groups(SYNC, X, g, **FEW), True),
+    "compare_groups(groups)": (lambda p: compare_groups(SYNC, X, Y, groups=p, **FEW), True),
     "compare_to_norm(y)": (lambda g: compare_to_norm(SYNC, X, g, norm=first_of(g)), True),
-    "compare_to_norm(groups)": (
-        lambda p: compare_to_norm(SYNC, X, [0, 0, 0, 1, 1, 1], norm=0, groups=p),
-        True,
-    ),
-    "GroupDisplay.from_estimator(y)": (
-        lambda g: GroupDisplay.from_estimator(SYNC, X, g),
-        False,
-    ),
-    "GroupDisplay.from_estimator(groups)": (
-        lambda p: GroupDisplay.from_estimator(SYNC, X, groups=p),
-        False,
-    ),
+    "compare_to_norm(groups)": (lambda p: compare_to_norm(SYNC, X, Y, norm=0, groups=p), True),
     "write_report(y)": (lambda g: report(y=g), True),
     "write_report(groups)": (lambda p: report(groups=p), False),
     "find_trials(groups)": (lambda g: find_trials(SYNC, X[0], groups=g), True),
-    "LagDisplay.from_estimator(groups)": (
-        lambda g: LagDisplay.from_estimator(PARTS, X, groups=g),
-        False,
-    ),
-    "SynchronizationDisplay.from_estimator(y)": (
-        lambda g: SynchronizationDisplay.from_estimator(SYNC, X, y=g),
-        False,
-    ),
+    "GroupDisplay.from_estimator(y)": shown(GroupDisplay, SYNC, "y"),
+    "GroupDisplay.from_estimator(groups)": shown(GroupDisplay, SYNC, "groups"),
+    "LagDisplay.from_estimator(groups)": shown(LagDisplay, PARTS, "groups"),
+    "SynchronizationDisplay.from_estimator(y)": shown(SynchronizationDisplay, SYNC, "y"),
 }
 REFUSED = [
     ([*"abcde", None], r"\[5\] is missing, None"),
@@ -106,7 +84,6 @@ REFUSED = [
     ("abcdef", "{0} must be a list or 1-D array .* got 'abcdef'"),
     (dict.fromkeys(range(6)), "{0} must be a list or 1-D array .* got {{"),
     (set(range(6)), "{0} must be a list or 1-D array .* got {{"),
-    (3, "{0} must be a list or 1-D array .* got 3"),
     (np.zeros((6, 2)), r"{0} must be a list or 1-D array .* got shape \(6, 2\)"),
     ([["a"], ["b"]] * 3, r"{0}\[0\] is \['a'\]: a label is one"),
     ([0, 1, 2, 3, [4], 5], r"{0}\[4\] is \[4\]: a label is one"),
@@ -181,11 +158,8 @@ def test_codes_follow_first_appearance_or_the_sorted_labels():
         assert all(type(label) is str for label in labels)
     codes, labels = encode_groups(letters, 4, sort=True)
     assert (codes.tolist(), labels) == ([2, 0, 2, 1], ["a", "b", "c"])
-    for given in (
-        [2.5, -1, True],
-        pd.Categorical(["u", "t", "s"]),
-        pd.date_range("2020", periods=3),
-    ):
+    dates = pd.date_range("2020", periods=3)
+    for given in ([2.5, -1, True], pd.Categorical(["u", "t", "s"]), dates):
         assert encode_groups(given, 3)[0].tolist() == [0, 1, 2]
     codes, labels = encode_groups(None, 3, at_least=2)
     assert (codes.tolist(), labels) == ([0, 1, 2], [0, 1, 2])

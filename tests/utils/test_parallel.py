@@ -98,42 +98,29 @@ def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):
 # -- run ---------------------------------------------------------------------------------
 
 
-def square(x):
-    return x * x
-
-
 @pytest.mark.parametrize("n_jobs", [None, 1, 2])
 @pytest.mark.parametrize("n_portions", [0, 1, 5])
-def test_run_keeps_order_and_calls_step(n_jobs, n_portions):
-    steps = []
-    portions = [(i,) for i in range(n_portions)]
-    results = run(square, portions, n_jobs=n_jobs, prefer="threads", step=lambda: steps.append(1))
-    assert list(results) == [i * i for i in range(n_portions)]
+def test_run_keeps_order_calls_step_and_passes_shared_arguments_first(n_jobs, n_portions):
+    steps, portions = [], [(i,) for i in range(n_portions)]
+    settings = {"n_jobs": n_jobs, "common": ("a", "b"), "step": lambda: steps.append(1)}
+    found = run("{}{}{}".format, portions, prefer="threads", **settings)
+    assert list(found) == [f"ab{i}" for i in range(n_portions)]
     assert len(steps) == n_portions
 
 
-def test_run_keeps_warning_filters():
+def test_run_keeps_warning_filters_and_passes_the_configuration_of_scikit_learn():
     before = [*warnings.filters]
     for _ in range(5):
         list(run(time.sleep, [(1e-3 * (i % 3),) for i in range(20)], n_jobs=2, prefer="threads"))
     assert warnings.filters == before
-
-
-def test_run_passes_sklearn_configuration():
     with sklearn.config_context(working_memory=77):
         seen = list(run(sklearn.get_config, [()] * 5, n_jobs=2, prefer="threads"))
     assert {config["working_memory"] for config in seen} == {77}
 
 
-@pytest.mark.parametrize("n_jobs", [1, 2])
-def test_run_passes_shared_arguments_first(n_jobs):
-    found = run("{}{}{}".format, [(1,), (2,)], common=("a", "b"), n_jobs=n_jobs)
-    assert list(found) == ["ab1", "ab2"]
-
-
 def test_run_works_with_backends_without_generators():
     with joblib.parallel_config(backend="multiprocessing"):
-        assert list(run(square, [(1,), (2,), (3,)], n_jobs=2)) == [1, 4, 9]
+        assert list(run(pow, [(1,), (2,), (3,)], common=(2,), n_jobs=2)) == [2, 4, 8]
 
 
 # -- progress -------------------------------------------------------------------------------

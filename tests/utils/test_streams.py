@@ -26,15 +26,11 @@ def walks(n, seed):
     return [np.cumsum(random.standard_normal((length, 3)), axis=0) for length in lengths]
 
 
-def alike(trials, dtype):
-    return np.stack([x[:30] for x in trials]).astype(dtype)
-
-
 PORTIONS = {
     "a.npz": walks(6, 1),
-    "b.npy": alike(walks(5, 2), np.float64),
+    "b.npy": np.stack([x[:30] for x in walks(5, 2)]),
     "c.npz": walks(1, 3),
-    "d.npy": alike(walks(4, 4), np.float32),
+    "d.npy": np.stack([x[:30] for x in walks(4, 4)]).astype(np.float32),
 }
 
 
@@ -66,15 +62,10 @@ def run(*arguments):
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
-def results(folder):
-    return {path.name: np.load(path) for path in folder.iterdir() if path.suffix != ".json"}
-
-
 def assert_synchronized(folder, fitted):
-    found = results(folder)
-    assert sorted(found) == ["a.npy", "b.npy", "c.npy", "d.npy"]
+    assert sorted(path.name for path in folder.glob("*.np*")) == [f"{x}.npy" for x in "abcd"]
     for name, portion in PORTIONS.items():
-        expected, got = fitted[:-1].transform(portion), found[f"{name[0]}.npy"]
+        expected, got = fitted[:-1].transform(portion), np.load(folder / f"{name[0]}.npy")
         assert (got.dtype, got.tobytes()) == (expected.dtype, expected.tobytes())
 
 
@@ -134,7 +125,7 @@ def test_stream_continues_after_a_kill(files, fitted):
 
 
 def test_refused_and_unreadable_portions_do_not_stop_others(files, capsys):
-    wrong = alike(walks(3, 6), np.float64)
+    wrong = PORTIONS["b.npy"].copy()
     wrong[1, 4, 2] = np.inf
     np.save(files[1] / "b.npy", wrong)
     whole = (files[1] / "a.npz").read_bytes()
@@ -147,18 +138,19 @@ def test_refused_and_unreadable_portions_do_not_stop_others(files, capsys):
     for name in broken:
         pattern = rf"^{re.escape(name)}: .*It cannot be read, is it whole\? "
         assert re.search(pattern, printed, re.MULTILINE)
-    assert sorted(results(files[2])) == ["a.npy", "c.npy", "d.npy"]
+    assert sorted(path.name for path in files[2].glob("*.np*")) == ["a.npy", "c.npy", "d.npy"]
 
 
 def test_wrong_arguments_leave_no_folder(files):
     model, walks, out = files
     whole = model.with_name("model.joblib")
-    with pytest.raises(ValueError, match=r"ends in ActionModel and has no transform: .* --method"):
-        next(stream_files.stream(whole, walks, out))
-    with pytest.raises(ValueError, match=r"no portions in .*: files \.npy or \.npz"):
-        next(stream_files.stream(whole, walks.with_name("none"), out))
-    with pytest.raises(ValueError, match=r"Results among the portions .* give another folder"):
-        next(stream_files.stream(model, walks, walks / ".." / walks.name))
+    for arguments, message in (
+        ((whole, walks, out), r"ends in ActionModel and has no transform: .* --method"),
+        ((whole, walks.with_name("none"), out), r"no portions in .*: files \.npy or \.npz"),
+        ((model, walks, walks / ".." / walks.name), r"Results among .* give another folder"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            next(stream_files.stream(*arguments))
     assert not out.exists()
     joblib.dump(DenseSynchronizer(), model)
     assert "not fitted yet" in next(stream_files.stream(*files))[1]

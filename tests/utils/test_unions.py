@@ -82,20 +82,16 @@ def test_synchronized_bodies_are_drawn_for_any_view(view):
 @pytest.mark.parametrize("reduced", [False, True])
 def test_departures_of_a_raised_arm_mark_its_limbs(reduced):
     odd = BUNCH.data[0].reshape(-1, 15, 3).copy()
-    wrist, elbow, shoulder = (BUNCH.skeleton.index_of(f"left_{j}") for j in
-                              ("wrist", "elbow", "shoulder"))  # fmt: skip
+    parts = ("wrist", "elbow", "shoulder")
+    wrist, elbow, shoulder = (BUNCH.skeleton.index_of(f"left_{part}") for part in parts)
     # It waves, raised.
     angle = 0.4 * np.sin(np.linspace(0, 6 * np.pi, len(odd)))
     up = np.column_stack([np.sin(angle), np.cos(angle), 0 * angle])
     odd[:, elbow] = odd[:, shoulder] + 0.3 * up
     odd[:, wrist] = odd[:, elbow] + 0.25 * up
     X = [BUNCH.data[0], odd.reshape(len(odd), -1)]
-    pipe, plain = (
-        make_pipeline(
-            view, ASpace(0.95) if reduced else "passthrough", LinearSynchronizer(20), ActionModel()
-        ).fit(BUNCH.data)
-        for view in (clone(BOTH), clone(COSINES))
-    )
+    steps = ASpace(0.95) if reduced else "passthrough", LinearSynchronizer(20), ActionModel()
+    pipe, plain = (clone(make_pipeline(view, *steps)).fit(BUNCH.data) for view in (BOTH, COSINES))
     good, bad = (SkeletonDisplay.from_departures(pipe, X, trial=i) for i in (0, 1))
     assert "is accepted" in good.heading
     assert not any(good.marked)
