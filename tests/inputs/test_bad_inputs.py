@@ -328,15 +328,6 @@ def test_call_refuses(call, words):
     refuses(call, words)
 
 
-def test_fit_warns_of_a_clock_among_the_features():
-    clocks = [np.column_stack([0.02 * np.arange(len(x)), x]) for x in X]
-    with pytest.warns(UserWarning, match="Feature 0: increases evenly in every trial"):
-        LinearSynchronizer().fit(clocks)
-    named = [pd.DataFrame(x, columns=["time", *NAMES]).round(3) for x in clocks]
-    with pytest.warns(UserWarning, match="Feature 'time': .* clock"):
-        LinearSynchronizer().fit(named)
-
-
 @pytest.mark.parametrize("estimator", ALL, ids=by_name)
 @pytest.mark.parametrize("kind", [np.stack, list, lambda X: [pd.DataFrame(x) for x in X]])
 def test_fit_warns_of_exchanged_axes(estimator, kind):
@@ -371,15 +362,6 @@ def test_fit_accepts_magnitudes_within_the_limits(estimator):
     if hasattr(fitted, "transform"):
         # An answer for one trial does not depend on the others.
         fitted.transform([1e-12 * X[0]])
-
-
-@pytest.mark.parametrize(
-    "other", [np.zeros(20), -np.arange(20.0), np.arange(20.0) ** 1.2, np.r_[0:10, 9:19]]
-)
-def test_no_warning_of_what_is_no_clock_in_every_trial(other):
-    ramps = [np.column_stack([0.02 * np.arange(len(x)), x]) for x in X]
-    LinearSynchronizer().fit([*ramps, np.column_stack([other, X[0]])])
-    LinearSynchronizer().fit([ramp[:, :1] for ramp in ramps])
 
 
 @pytest.mark.parametrize("columns", [["walk1", "walk2", "walk3"], [4, 5, 6]])

@@ -32,6 +32,11 @@ def beside(column):
     ]
 
 
+def named(trials, name):
+    """Tables of them, whose last column has this name."""
+    return [pd.DataFrame(x, columns=["hip", "knee", "ankle", "force", name]) for x in trials]
+
+
 def yaw(t, i):
     return (170 + (25 + i % 3) * np.sin(np.pi * t) + 180) % 360 - 180
 
@@ -65,14 +70,12 @@ MADE = {
     ),
     "quaternion": (beside(quaternion), {"feature": WIDTH, "n_trials": len(GAIT)}),
     "quality": (
-        [
-            pd.DataFrame(x).rename(columns=str).rename(columns={str(WIDTH): "nose_likelihood"})
-            for x in beside(lambda t, i: 0.8 + 0.2 * np.sin(9 * t + i))
-        ],
+        named(beside(lambda t, i: 0.8 + 0.2 * np.sin(9 * t + i)), "nose_likelihood"),
         {"feature": "nose_likelihood"},
     ),
     "fill value": (with_one(BENDS, 2, hidden), {"trial": 2, "first": 20, "last": 29, "value": 0}),
     "clock": (beside(lambda t, i: t), {"feature": WIDTH}),
+    "named clock": (named(beside(lambda t, i: t), "time"), {"kind": "clock", "feature": "time"}),
     "constant": (beside(lambda t, i: 0 * t + 3), {"feature": WIDTH}),
     "zeros at the end": (
         with_one(GAIT, 4, lambda x: np.vstack([x, np.zeros((9, WIDTH))])),
@@ -121,8 +124,13 @@ def test_a_made_fault_is_the_only_finding(name):
         BENDS,
         [np.asarray(x) for x in make_walk(4, random_state=0).data],
         [np.where(np.arange(len(x))[:, np.newaxis] // 9 == 3, np.nan, x) for x in GAIT],
+        # What is no clock in every trial, or is all there is.
+        beside(lambda t, i: t if i else -t),
+        beside(lambda t, i: t if i else t**1.2),
+        beside(lambda t, i: t if i else np.where(t > 0.5, t - t[1], t)),
+        [np.linspace(0, 1, len(x))[:, np.newaxis] for x in GAIT],
     ],
-    ids=["gait", "bending", "walk", "gaps"],
+    ids=["gait", "bending", "walk", "gaps", "back", "uneven", "twice", "alone"],
 )
 def test_nothing_of_made_movement(trials):
     assert check_trials(trials).empty
@@ -172,6 +180,12 @@ def test_a_fit_warns_once(estimator, name, words):
     assert len(told) == 1
     assert re.match(words, told[0])
     assert "check_trials(X)" in told[0]
+
+
+@pytest.mark.parametrize(("name", "feature"), [("clock", WIDTH), ("named clock", "'time'")])
+def test_a_clock_is_warned_of_where_trials_are_matched(name, feature):
+    with pytest.warns(UserWarning, match=f"Feature {feature}: increases evenly in every trial"):
+        LinearSynchronizer(51).fit(MADE[name][0])
 
 
 @pytest.mark.parametrize("name", ["wrapping", "quaternion", "fill value", "zeros at the end"])

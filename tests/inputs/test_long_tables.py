@@ -299,27 +299,16 @@ def test_a_recording_of_one_trial_keeps_its_name():
 
 def test_uneven_times_that_were_made_even_are_a_frame_rate():
     seconds = 2 + np.delete(np.arange(101) / 100, [3, 50])
-    df = recording(seconds, times=seconds.tolist(), events=events_at(2.0, 48.5, None, -3.0))
+    df = recording(seconds, times=seconds.tolist(), events=events_at(2.0, 48.5, None))
     for time in (seconds, seconds - 2, 1000 * seconds, pd.to_timedelta(seconds, unit="s")):
         (x,) = to_trials(df.assign(time=time), time="time", max_gap_time=1e5)
         assert x.attrs["frame_rate"] == 100
         assert x.attrs["first_time"] == 2
         assert "times" not in x.attrs
         # The event stays at its time: one missing frame came before, the other is bridged.
-        assert [e["frame"] for e in x.attrs["events"]] == pytest.approx([2, 50, None, -3], abs=0.1)
+        assert [e["frame"] for e in x.attrs["events"]] == pytest.approx([2, 50, None], abs=0.1)
     assert df.attrs["times"] == seconds.tolist()
-    assert [e["frame"] for e in df.attrs["events"]] == [2, 48.5, None, -3]
-
-
-def test_another_frame_rate_is_that_of_the_recording():
-    df = recording(np.arange(101) / 100, frame_rate=100.0, events=events_at(30.0))
-    df = df.assign(ms=np.arange(101) * 10.0)
-    (x,) = to_trials(df, time="ms", frame_rate=0.05)
-    assert x.attrs["frame_rate"] == 50
-    assert x.attrs["events"] == events_at(15.0)
-    (x,) = to_trials(df, time="ms")
-    assert x.attrs["frame_rate"] == 100
-    assert x.attrs["events"] == events_at(30.0)
+    assert df.attrs["events"] == events_at(2.0, 48.5, None)
 
 
 @pytest.mark.parametrize("time", [None, "frame"])
@@ -336,19 +325,17 @@ def test_parts_of_a_recording_have_their_own_times(time):
     assert second.attrs["first_frame"] == 11
 
 
-@pytest.mark.parametrize("frame", [-7.0, 0.0, 16.9, 39.0, 55.0])
-def test_events_stay_at_their_times_between_and_beyond_uneven_frames(frame):
+def test_events_stay_at_their_times_between_and_beyond_uneven_frames():
     """On a straight line between frames, and at the mean step beyond them."""
     seconds = 2 + np.cumsum(np.random.default_rng(0).uniform(0.009, 0.016, 40))
-    df = recording(seconds, times=seconds.tolist(), events=events_at(frame))
+    frames = np.array([-7.0, 0.0, 16.9, 39.0, 55.0])
+    df = recording(seconds, times=seconds.tolist(), events=events_at(*frames))
     (x,) = to_trials(df.assign(t=seconds), time="t")
     assert x.attrs["resampled"]
-    pace = (seconds[-1] - seconds[0]) / 39
-    time = np.interp(frame, np.arange(40), seconds)
-    time += pace * (min(frame, 0) + max(frame - 39, 0))
-    step = x.index[1] - x.index[0]
-    (event,) = x.attrs["events"]
-    assert event["frame"] == pytest.approx((time - seconds[0]) / step, abs=1e-4)
+    times = np.interp(frames, np.arange(40), seconds)
+    times += (frames - frames.clip(0, 39)) * (seconds[-1] - seconds[0]) / 39
+    expected = (times - seconds[0]) / (x.index[1] - x.index[0])
+    assert [event["frame"] for event in x.attrs["events"]] == pytest.approx(expected, abs=1e-4)
 
 
 def test_a_trial_of_one_row_has_a_clock():

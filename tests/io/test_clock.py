@@ -110,6 +110,10 @@ def test_the_times_of_a_column_are_the_clock_of_its_trials(tmp_path, start):
     (trial,) = to_trials(df.assign(ms=1000 * seconds), time="ms")
     assert trial.attrs["first_time"] == (FIRST - 1) / RATE
     assert trial.attrs["events"] == df.attrs["events"]
+    # The frame rate stays one a second.
+    (trial,) = to_trials(df.assign(ms=1000 * seconds), time="ms", frame_rate=0.025)
+    assert trial.attrs["frame_rate"] == 25
+    assert trial.attrs["events"][0]["frame"] == df.attrs["events"][0]["frame"] / 2
 
 
 def test_analog_channels_have_the_clock_of_the_markers(tmp_path):
