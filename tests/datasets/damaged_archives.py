@@ -17,7 +17,7 @@ def fields():
     return {
         "positions": np.random.default_rng(0).standard_normal((12, 20, 3)).astype(np.float32),
         "offsets": [0, 5, 12],
-        "label": ["bow", "wave"],
+        "label": ["bow", "w\u00e4ve"],
         "actor": ["A", "B"],
         "take": ["1", "1"],
         "fps": [30.0, np.nan],
@@ -30,9 +30,11 @@ def make_archives():
     """The bytes of archives, plain and compressed, of other types and byte orders."""
     other = fields() | {
         "positions": np.asfortranarray(fields()["positions"].astype(">f8")),
-        "offsets": np.array([0, 5, 12], "u8"),
-        "label": np.array(["bow", "wave"], "S"),
+        "offsets": np.array([0, 5, 12], ">u8"),
+        "label": np.array(["bow", "w\u00e4ve".encode()], "S"),
         "actor": [1, 2],
+        "parents": np.array(fields()["parents"], float),
+        "fps": [30, 25],
     }
     contents = []
     for content in (fields(), other):

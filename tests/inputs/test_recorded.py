@@ -133,6 +133,10 @@ def in_seconds(df, rate, start=0.0):
     return df.set_axis(pd.Index(start + np.arange(len(df)) / rate, name="time"))
 
 
+def in_dates(df):
+    return df.set_axis(pd.date_range("2024-05-01", periods=len(df), freq="10ms", name="time"))
+
+
 UNEVEN = [
     (lambda df: df.iloc[::-1], "not in order of time.*'frame'.* follows.*sort_index"),
     (lambda df: df.sample(frac=1, random_state=0), "not in order of time"),
@@ -140,6 +144,7 @@ UNEVEN = [
     (lambda df: in_seconds(df, 30).iloc[::-1], "not in order of time.*'time'"),
     (lambda df: df.drop(df.index[5:7]), "not even: from 4 to 7 it is 3, mostly 1"),
     (lambda df: in_seconds(df, 30).drop(5 / 30), "level 'time' .* not even"),
+    (lambda df: in_dates(df).drop(in_dates(df).index[5]), "level 'time' .* not even"),
     (lambda df: in_seconds(df, 60), "index has 60 frames a second, and .* is 30"),
     (lambda df: in_seconds(df, 20), "index has 20 frames a second, and .* is 30"),
 ]
@@ -363,7 +368,5 @@ def test_events_of_other_rows_are_refused_by_row_and_frame():
         ([0, 1, 2, 9], 3, 9),
         (slice(None, None, 2), 1, 2),
     ):
-        with pytest.raises(
-            ValueError, match=rf"^Trial 2: by its index row {row} is frame {frame} "
-        ):
+        with pytest.raises(ValueError, match=f"^Trial 2: by its index row {row} is frame {frame} "):
             refuse_moved_events([good, np.zeros((9, 1)), good.iloc[rows]])

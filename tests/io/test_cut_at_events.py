@@ -89,15 +89,6 @@ def test_attrs_belong_to_the_trial():
     assert short.attrs["events"] == []
 
 
-def test_times_are_cut_too():
-    times = np.linspace(0, 1, 200) ** 2
-    uneven = cut_at_events(recording(*WALK, times=times.tolist(), frame_rate=None), LEFT)[1]
-    assert uneven.attrs["times"] == times[91:162].tolist()
-    assert uneven.attrs["first_time"] == times[91]
-    even = cut_at_events(recording(*WALK, first_time=2.0, frame_rate=100.0), LEFT)[1]
-    assert even.attrs["first_time"] == pytest.approx(2.91)
-
-
 def test_labels_follow_those_of_the_recording():
     def labels(parts):
         return [(x.attrs["trial"], x.attrs["levels"]) for x in parts]

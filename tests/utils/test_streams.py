@@ -154,21 +154,16 @@ def test_wrong_arguments_leave_no_folder(files):
     assert not out.exists()
     joblib.dump(DenseSynchronizer(), model)
     assert "not fitted yet" in next(stream_files.stream(*files))[1]
+    # Results of two models or methods are not mixed.
     assert [wrong for _, wrong in stream_files.stream(whole, walks, out, "match")] == [None] * 4
+    note = json.loads((out / "made_by.json").read_text(encoding="utf-8"))
+    assert note["sklearn_motionsync"] == sklearn_motionsync.__version__
     with pytest.raises(ValueError, match="results of another model and another method"):
         next(stream_files.stream(*files))
+    with pytest.raises(ValueError, match=r"results of another method \(made_by.json\)"):
+        next(stream_files.stream(whole, walks, out, "score_samples"))
+    message = stream_files.main([*map(str, files), "--method", "match"])
+    assert "holds results of another model (made_by.json): give another folder" in message
     np.save(walks / "a.npy", PORTIONS["b.npy"])
     with pytest.raises(ValueError, match=r"a\.npy and a\.npz would have one result"):
         next(stream_files.stream(*files))
-
-
-def test_results_of_two_models_or_methods_are_not_mixed(files, fitted):
-    assert len(list(stream_files.stream(*files))) == 4
-    with pytest.raises(ValueError, match=r"results of another method \(made_by.json\)"):
-        next(stream_files.stream(*files, method="match"))
-    joblib.dump(DenseSynchronizer(n_frames=30).fit(walks(12, 0)), files[0])
-    message = stream_files.main([str(path) for path in files])
-    assert "holds results of another model (made_by.json): give another folder" in message
-    note = json.loads((files[2] / "made_by.json").read_text(encoding="utf-8"))
-    assert note["sklearn_motionsync"] == sklearn_motionsync.__version__
-    assert_synchronized(files[2], fitted)
