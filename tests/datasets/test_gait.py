@@ -87,10 +87,8 @@ def test_timing_delays_toe_off_of_group_b():
 
 
 def test_timing_keeps_poses_and_amplitude_keeps_times():
-    plain, later, larger = (
-        make_gait(4, noise=0, random_state=0, **params)
-        for params in ({}, {"timing": 6}, {"amplitude": 15})
-    )
+    changes = {}, {"timing": 6}, {"amplitude": 15}
+    plain, later, larger = (make_gait(4, noise=0, random_state=0, **each) for each in changes)
     assert np.abs(on_clock(later) - on_clock(plain)).max() < 0.3
     in_b = plain.group == "B"
     np.testing.assert_array_equal(larger.keyframes, plain.keyframes)
@@ -137,9 +135,8 @@ def test_takes_are_continuous_walks_with_their_events(takes):
         assert (np.diff(times) > 0).all()
         assert -0.5 < times[0] < 0
         assert 4 < times[-1] < 4.5
-        assert [event["label"] for event in events] == 4 * ["Foot Strike", "Foot Off"] + [
-            "Foot Strike"
-        ]
+        labels = [event["label"] for event in events]
+        assert labels == [*(4 * ["Foot Strike", "Foot Off"]), "Foot Strike"]
         assert set(events[0]) == {"label", "context", "time", "frame"}
         at = [event["frame"] for event in events]
         assert [event["time"] * 100 for event in events] == pytest.approx(at)

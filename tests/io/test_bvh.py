@@ -175,9 +175,8 @@ def test_stated_frames_that_contradict_those_that_are_there_are_a_warning(tmp_pa
     expected = read_motion(put(tmp_path, body()))
     text = body().replace("Frames: 3", f"Frames: {stated}")
     n = text.rindex("\n", 0, -1) + 1  # without the last row
-    with pytest.warns(UserWarning, match=rf"Frames: says {stated}, but 2 frames follow") as caught:
+    with pytest.warns(UserWarning, match=rf"Frames: says {stated}, but 2 frames follow"):
         pd.testing.assert_frame_equal(read_motion(put(tmp_path, text[:n])), expected[:2])
-    assert caught[0].filename == __file__
 
 
 def test_small_file_with_a_huge_result_is_refused(tmp_path):

@@ -90,21 +90,20 @@ def test_attrs_belong_to_the_trial():
 
 
 def test_labels_follow_those_of_the_recording():
-    def labels(parts):
-        return [(x.attrs["trial"], x.attrs["levels"]) for x in parts]
-
-    plain = cut_at_events(recording(*WALK), LEFT)
-    assert labels(plain) == [(i, ("trial", "frame")) for i in range(2)]
-    named = cut_at_events(recording(*WALK, trial="walk"), LEFT)
-    assert labels(named) == [(("walk", i), ("recording", "part", "frame")) for i in range(2)]
     known = recording(*WALK, trial=("ann", 3), levels=("subject", "trial", "frame"))
-    levels = ("subject", "trial", "part", "frame")
-    assert labels(cut_at_events(known, LEFT)) == [(("ann", 3, i), levels) for i in range(2)]
-    again = cut_at_events(cut_at_events(known, LEFT)[0], OFF)
-    assert labels(again) == [(("ann", 3, 0, 0), ("subject", "trial", "part", "part_4", "frame"))]
-    pair = cut_at_events(recording(*WALK, trial=("ann", 3)), LEFT)
-    assert pair[0].attrs["levels"] == ("recording_0", "recording_1", "part", "frame")
-    assert len(to_frame(named)) == 72 + 71
+    for df, first, levels in (
+        (recording(*WALK), 0, "trial"),
+        (recording(*WALK, trial="walk"), ("walk", 0), "recording part"),
+        (known, ("ann", 3, 0), "subject trial part"),
+        (recording(*WALK, trial=("ann", 3)), ("ann", 3, 0), "recording_0 recording_1 part"),
+    ):
+        parts = cut_at_events(df, LEFT)
+        assert [x.attrs["trial"] for x in parts] == [first, (*first[:-1], 1) if first else 1]
+        assert [x.attrs["levels"] for x in parts] == [(*levels.split(), "frame")] * 2
+        assert len(to_frame(parts)) == 72 + 71
+    (again,) = cut_at_events(cut_at_events(known, LEFT)[0], OFF)
+    assert again.attrs["trial"] == ("ann", 3, 0, 0)
+    assert again.attrs["levels"] == ("subject", "trial", "part", "part_4", "frame")
 
 
 @pytest.mark.parametrize(
@@ -150,14 +149,10 @@ def test_groups_of_a_file_are_cut_at_the_same_times(tmp_path, group):
     assert part.attrs == same.attrs
 
 
-def test_a_static_trial_without_events_gives_none_and_is_named():
+def test_messages_name_the_recording_and_are_short_whatever_is_marked():
     message = r"^The recording 'standing' has no events, so no trial is cut out of it\.$"
-    with pytest.warns(UserWarning, match=message) as caught:
+    with pytest.warns(UserWarning, match=message):
         assert cut_at_events(recording(trial="standing"), LEFT) == []
-    assert caught[0].filename == __file__
-
-
-def test_messages_are_short_whatever_is_marked():
     many = [("a long label of an event " * 9 + str(k), "General", 3.0) for k in range(200)]
     for df in (recording(*many, trial="p" * 300), recording(("a", None, "x" * 9999))):
         with pytest.raises(ValueError, match="The recording") as caught:

@@ -44,11 +44,11 @@ def test_sections_of_nexus_are_read_in_any_order(tmp_path, separator, order):
     assert (angles.attrs["joints"], angles.attrs["units"]) == (["LKneeAngles"], "deg")
     moments = read(tmp_path, text, group="moments")
     np.testing.assert_array_equal(moments, values[0][:, 3:])
+    facts = {"channels": ["Fx", "EMG"], "units": ["N", "V"], "frame_rate": 400, "first_time": 1.0}
     for group in ("analog", "devices"):
         analog = read(tmp_path, text, group=group)
         np.testing.assert_array_equal(analog, forces)
-        assert (list(analog), analog.attrs["units"]) == (["Fx", "EMG"], ["N", "V"])
-        assert (analog.attrs["frame_rate"], analog.attrs["first_time"]) == (400, 1.0)
+        assert facts.items() <= analog.attrs.items()
         assert [event["frame"] for event in analog.attrs["events"]] == [40.0, 92.0]
 
 
@@ -85,13 +85,9 @@ def test_segments_have_positions_and_single_columns_are_channels(tmp_path):
     df = read(tmp_path, text, group="segments")
     np.testing.assert_array_equal(df, XYZ[:, 3:6])
     assert df.attrs["left_out"] == "1 scalar, 1 rotation"
-    scalars = read(tmp_path, text, group="scalars")
-    np.testing.assert_array_equal(scalars, XYZ[:, :1])
-
-
-def test_channels_of_several_plates_have_the_names_of_their_plates(tmp_path):
-    names = ["Plate 1", "Plate 2"]
-    text = vicon("Devices", 50, names, XYZ[:, :4], ["Fx", "Fy"], units="N")
+    np.testing.assert_array_equal(read(tmp_path, text, group="scalars"), XYZ[:, :1])
+    # Those of several plates have the names of their plates.
+    text = vicon("Devices", 50, ["Plate 1", "Plate 2"], XYZ[:, :4], ["Fx", "Fy"], units="N")
     text += "\n" + vicon("Devices", 200, ["EMG"], XYZ[:, :1], ["1"], units="V", per_frame=4)
     df = read(tmp_path, text, group="analog")
     assert list(df) == ["Plate 1 Fx", "Plate 1 Fy", "Plate 2 Fx", "Plate 2 Fy"]
@@ -169,9 +165,8 @@ def test_bodies_of_qtm_have_positions(tmp_path):
 def test_counts_of_qtm_that_contradict_the_rows_are_warnings(tmp_path):
     text = qtm(NAMES, XYZ, header={"NO_OF_FRAMES": 900, "NO_OF_MARKERS": 2})
     markers = pytest.warns(UserWarning, match="NO_OF_MARKERS says 2, but 3 markers follow")
-    with markers, pytest.warns(UserWarning, match="FRAMES says 900, but 40 frames f") as caught:
+    with markers, pytest.warns(UserWarning, match="FRAMES says 900, but 40 frames f"):
         np.testing.assert_array_equal(read(tmp_path, text, "a.tsv"), XYZ)
-    assert caught[0].filename == __file__
     with pytest.raises(ValueError, match=r"a\.tsv, line 49: NO_OF_FRAMES says 900, .*not compl"):
         read(tmp_path, text[:-1], "a.tsv")
     for change, message in (
@@ -232,14 +227,13 @@ def test_markers_of_motive_are_a_group_of_a_file_with_bones(tmp_path):
     np.testing.assert_array_equal(df, values[:, 21:24])
     assert df.attrs["joints"] == ["HTop"]
     # Without bones the markers are read.
-    path = put(tmp_path, motive(more, values[:, 21:], **{"Length Units": "Millimeters"}), "b.csv")
+    text = motive(more, values[:, 21:], **{"Length Units": "Millimeters"})
     with pytest.warns(UserWarning, match="1 of 1 marker"):
-        alone = read_motion(path)
+        alone = read(tmp_path, text)
     np.testing.assert_array_equal(alone, df)
     assert alone.attrs["units"] == "mm"
-    path = put(tmp_path, motive(more[3:], values[:, 24:]), "c.csv")
-    with pytest.raises(ValueError, match=r"c\.csv: there are no markers .* not its 1 unlabelled m"):
-        read_motion(path)
+    with pytest.raises(ValueError, match=r"a\.csv: there are no markers .* not its 1 unlabelled m"):
+        read(tmp_path, motive(more[3:], values[:, 24:]))
 
 
 def test_skeleton_of_motive_is_made_of_its_bones(tmp_path):
