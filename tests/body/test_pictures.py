@@ -77,8 +77,7 @@ def test_cosines_of_hips_and_shoulders_seen_end_on_are_0(reference):
         with pytest.raises(ValueError, match="the limb 'left_thigh' has no length"):
             kind(PLANE).fit(faulty)
     # A moment of coincidence is rather a key-point that was not found.
-    (x,) = make_bending(1, random_state=1).data
-    lost = picture_of(x)
+    lost = picture_of(make_bending(1, random_state=1).data[0])
     for side in ("left", "right"):
         lost[5, 2 * PAPER.index_of(f"{side}_hip") :][:2] = 0
     with pytest.raises(ValueError, match=r"frame 5: the limb 'hip' has no length"):

@@ -52,7 +52,6 @@ def test_a_nested_table_is_a_trial_a_row(trials, cell):
     same_bits([whole.to_numpy()], [np.concatenate(trials)])
     aligned = sync().set_output(transform="pandas").fit(table).transform(table)
     assert aligned.index.names == ["person", "frame"]
-    same_bits([aligned.to_numpy().reshape(12, 30, 3)], [sync().fit(trials).transform(trials)])
 
 
 def test_cells_keep_times_types_and_labels_of_several_levels(trials):
@@ -78,7 +77,6 @@ def test_lists_in_a_table_of_polars(trials):
     cells = {name: [x[:, k].tolist() for x in trials] for k, name in enumerate(NAMES)}
     table = pl.DataFrame(cells)
     same_bits(to_trials(table), trials)
-    same_bits([sync().fit(table).transform(table)], [sync().fit(trials).transform(trials)])
 
 
 # -- arrays with channels before frames, as aeon and sktime have them -----------------------------
@@ -128,7 +126,6 @@ def test_a_labelled_array_keeps_names_times_and_units(trials, order):
     aligned = sync().set_output(transform="pandas").fit(given).transform(given)
     assert aligned.index.names == ["trial", "frame"]
     assert list(aligned.columns) == NAMES
-    same_bits([sync().fit(given).transform(given)], [sync().fit(expected).transform(expected)])
 
 
 def test_the_time_of_a_labelled_array_is_that_of_warps(trials):

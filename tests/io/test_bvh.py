@@ -69,11 +69,10 @@ def test_many_joints_deep_and_wide(tmp_path, deep, n):
 def test_chain_bends_to_half_a_circle_in_more_frames_than_one_block(tmp_path):
     n, n_frames = 600, 1760
     joint = "JOINT a { OFFSET 0 1 0 CHANNELS 1 Zrotation "
-    text = (
-        f"HIERARCHY\nROOT a {{ OFFSET 0 0 0 {joint * n + '} ' * n}}}\nMOTION\nFrames: {n_frames}\n"
-    )
     turns = np.linspace(0, 180 / n, n_frames).round(6)
-    text += "Frame Time: 1\n" + "".join(f"{turn} " * n + "\n" for turn in turns)
+    text = f"HIERARCHY\nROOT a {{ OFFSET 0 0 0 {joint * n + '} ' * n}}}\nMOTION\n"
+    text += f"Frames: {n_frames}\nFrame Time: 1\n"
+    text += "".join(f"{turn} " * n + "\n" for turn in turns)
     df = read_motion(put(tmp_path, text))
     angles = np.radians(turns)[:, None] * np.arange(n)
     expected = np.column_stack([-np.sin(angles).sum(axis=1), np.cos(angles).sum(axis=1)])
@@ -154,14 +153,11 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         (small("0"), "no joint has CHANNELS"),
         (small().replace("}", "End Site { OFFSET 0 0 0 CHANNELS 1 Xrotation } }"), "End Site has"),
         (small(motion=""), "line 7: expected 'Frames: <number>', got ''"),
-        (small(motion="Frame: 1\nFrame Time: 1\n1 2 3\n"), "expected 'Frames: <number>', got 'Fr"),
         (small(motion="Frames: 1\nTime: 1\n1 2 3\n"), "expected 'Frame Time: <number>', got 'Ti"),
         (small(motion="Frames: -1\n"), "Frames: needs a whole number, 0 or more, got '-1'"),
         (small(motion="Frames: 1\nFrame Time: 0\n1 2 3"), "Frame Time: must be above 0"),
-        (small(motion="Frames: 1\nFrame Time: inf\n1 2 3"), "Frame Time: needs finite numbers"),
         (small(motion="Frames: 99999\nFrame Time: 1\n1 2 3"), "9, but 1 frame follows, and"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 2\n"), "a frame .* needs 3 numbers, got 2"),
-        (small(motion="Frames: 2\nFrame Time: 1\n1.00 2.00 3.00\n4 5"), "needs 3 numbers, got 2"),
         (small(motion="Frames: 4\nFrame Time: 1\n\n"), "the file ends where frames should follow"),
     ],
 )

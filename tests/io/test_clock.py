@@ -23,19 +23,14 @@ FIRST, RATE, N = 695, 50.0, 60
 SECONDS = (FIRST - 1 + np.arange(N)) / RATE
 
 
-def cropped(times=(14.2, 14.6, 14.9), **params):
+def cropped(**params):
     """A C3D file that begins at frame 695; markers at x are the seconds of each frame."""
     positions = np.tile(SECONDS[:, None, None], (1, 2, 3)) + [0, 1, 2]
-    events = {
-        "USED": words(len(times)),
-        "LABELS": texts(*["Foot Strike"] * len(times)),
-        "CONTEXTS": texts(*["Left"] * len(times)),
-        "TIMES": (4, [2, len(times)], floats(*(v for t in times for v in (0, t)))[2]),
-    }
+    events = {"USED": words(3), "LABELS": texts(*["Foot Strike"] * 3)}
+    events["TIMES"] = 4, [2, 3], floats(0, 14.2, 0, 14.6, 0, 14.9)[2]
+    others = {"EVENT": events} | params.pop("others", {})
     header = {"first": FIRST, "last": FIRST + N - 1}
-    return c3d(
-        positions, header=header, others={"EVENT": events} | params.pop("others", {}), **params
-    )
+    return c3d(positions, header=header, others=others, **params)
 
 
 def written(ending):

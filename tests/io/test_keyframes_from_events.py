@@ -112,36 +112,34 @@ def test_the_ends_are_left_out():
         keyframes_from_events(trials(), pd.concat([table(), ends]), ["strike"])
 
 
-def changed(**columns):
+def changed(column, value):
     """The table with one row changed: the toe-off of the first trial."""
-    events = table().sort_index().reset_index(drop=True)
-    for column, value in columns.items():
-        events[column] = events[column].astype(object)
-        events.loc[0, column] = value
+    events = table().sort_index().astype({column: object})
+    events.loc[0, column] = value
     return events
 
 
 MORE = pd.DataFrame([("ann", 2, NAMES[1], 90.0)], columns=table().columns)
 BAD = {
     "twice": (
-        pd.concat([table(), changed(frame=64.0)[:1]]),
+        pd.concat([table(), changed("frame", 64.0)[:1]]),
         r"^Trial 0 \('ann', 1\): event 'toe-off' comes twice, in rows 6.* and 6",
     ),
-    "outside": (changed(frame=101), "^Trial 0 .*'toe-off' at 101 is outside.* 100"),
-    "before": (changed(frame=-1), "'toe-off' at -1 is outside of it, from 0 to 100"),
-    "unknown": (changed(trial=7), r"trial \('ann', 7\) of event 'toe-off' is not in X"),
+    "outside": (changed("frame", 101), "^Trial 0 .*'toe-off' at 101 is outside.* 100"),
+    "before": (changed("frame", -1), "'toe-off' at -1 is outside of it, from 0 to 100"),
+    "unknown": (changed("trial", 7), r"trial \('ann', 7\) of event 'toe-off' is not in X"),
     "none known": (table().assign(subject="eve"), r"trial \('eve', .* is not in X, whose trials"),
     "order": (
-        pd.concat([changed(frame=80.0), MORE]),
+        pd.concat([changed("frame", 80.0), MORE]),
         r"'ann', [12]\): event .* is not after .*Key-frames have one order, and one each at",
     ),
-    "at once": (changed(frame=73.5), "not after .* in row 73.5. Key-frames have one order, and"),
+    "at once": (changed("frame", 73.5), "not after .* in row 73.5. Key-frames have one order, and"),
     "no event": (table().drop(columns="event"), r"no column event; there are .*events.melt\(\['su"),
     "no time": (table().drop(columns="frame"), "no column frame or seconds"),
     "no level": (table().drop(columns="trial"), "no column 'trial', a level of the labels of X"),
-    "text": (changed(frame="soon"), "events: column 'frame'"),
+    "text": (changed("frame", "soon"), "events: column 'frame'"),
     "nothing": (table().assign(frame=np.nan), "No trial has an event"),
-    "never": (changed(frame=-np.inf), r"events: row 0, .* \('frame'\) is infinity"),
+    "never": (changed("frame", -np.inf), r"events: row 0, .* \('frame'\) is infinity"),
     "a list": ([{"event": "x"}], "must be a DataFrame of pandas or polars, got list"),
 }  # fmt: skip
 

@@ -211,14 +211,11 @@ def test_arrays_have_the_names_of_freemocap(tmp_path, n):
     check(read_motion(put(tmp_path, npy(array), "a.npy")), array, joints)
 
 
-@pytest.mark.parametrize(
-    "array",
-    [np.ones((4, 3)), np.ones((4, 3, 4)), np.array([["a"]]), np.array([None]), np.ones((0, 2, 3))],
-)
-def test_other_arrays_are_refused(tmp_path, array):
+def test_other_arrays_are_refused(tmp_path):
     message = r"a\.npy needs an array of numbers \(n_frames, n_joints, 2 or 3\)"
-    with pytest.raises(ValueError, match=message):
-        read_motion(put(tmp_path, npy(array), "a.npy"))
+    for shape, value in (((4, 3), 1), ((4, 3, 4), 1), ((1, 1), "a"), ((1,), None), ((0, 2, 3), 1)):
+        with pytest.raises(ValueError, match=message):
+            read_motion(put(tmp_path, npy(np.full(shape, value)), "a.npy"))
 
 
 @pytest.mark.parametrize(
@@ -292,7 +289,6 @@ def test_wrong_tables_are_refused_with_the_place(tmp_path, text, message):
 
 
 def test_the_confidence_is_cut_with_the_frames(tmp_path):
-    rows = [[np.nan, np.nan, 0.1], [1, 2, 0.2], [3, 4, 0.3], [5, 6, 0.4]]
-    path = put(tmp_path, table(["hip_x", "hip_y", "hip_likelihood"], rows), "a.csv")
-    df = read_motion(path, frame_rate=30, ends="trim", quality="keep")
+    text = "hip_x,hip_y,hip_likelihood\n,,0.1\n1,2,0.2\n3,4,0.3\n5,6,0.4\n"
+    df = read_motion(put(tmp_path, text, "a.csv"), ends="trim", quality="keep")
     assert df["hip_confidence"].tolist() == [0.2, 0.3, 0.4]

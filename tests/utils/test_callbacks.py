@@ -136,10 +136,8 @@ def test_callbacks_reach_what_is_fitted_within(estimator, within, stage):
     watched = clone(estimator).set_callbacks(recorder).fit(X)
     begun = [context for hook, context in recorder.contexts if hook == "begin"]
     (inner,) = [c for c in begun if c.estimator_name == within and c.task_name == "fit"]
-    assert (inner.source_estimator_name, inner.source_task_name) == (
-        type(estimator).__name__,
-        stage,
-    )
+    source = inner.source_estimator_name, inner.source_task_name
+    assert source == (type(estimator).__name__, stage)
     assert inner.parent is begun[0]
     assert recorder.open == []
     assert recorder.torn_down == 1
