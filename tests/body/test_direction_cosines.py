@@ -68,7 +68,7 @@ def test_parent_cosines_of_limbs_opposite_to_rest_are_unit_and_invertible(n_dims
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_inverse_transform_reconstructs_positions_except_place_and_heading(reference, recording):
+def test_inverse_transform_reconstructs_positions_except_place_and_heading(reference):
     """Exactly, but for place and heading: the embedded body is built like the inverse's."""
     bunch = make_bending(1, noise=0, random_state=1)
     cosines = DirectionCosines(bunch.skeleton, reference)

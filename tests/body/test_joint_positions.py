@@ -6,18 +6,11 @@ from statistics import median
 import numpy as np
 import pytest
 from sklearn_motionsync import JointPositions, Skeleton
-from sklearn_motionsync.datasets import load_trials
 
 from made_bodies import standing
 
 PAPER = Skeleton.paper()
 LANDMARKS = list(PAPER.joints)[1:]
-
-
-def places(body, reference="heading"):
-    """Landmark: where it is, of a body of one pose."""
-    features = JointPositions(PAPER, reference).fit_transform([np.vstack([body, body])])[0][0]
-    return dict(zip(LANDMARKS, map(tuple, features.reshape(14, 3).round(9) + 0.0), strict=True))
 
 
 # -- closed forms -------------------------------------------------------------------------
@@ -27,9 +20,10 @@ def places(body, reference="heading"):
 @pytest.mark.parametrize("reference", ["heading", "world"])
 def test_positions_of_a_known_body(reference, size):
     """Its legs are 1 long, and it looks along z."""
-    at = places(
-        size * standing(left_wrist=(0.2, 1.2, 0.3), right_ankle=(-0.1, 0.5, -0.5)), reference
-    )
+    body = size * standing(left_wrist=(0.2, 1.2, 0.3), right_ankle=(-0.1, 0.5, -0.5))
+    features = JointPositions(PAPER, reference).fit_transform(np.vstack([body, body]))[0]
+    places = (features.reshape(14, 3).round(9) + 0.0).tolist()
+    at = dict(zip(LANDMARKS, map(tuple, places), strict=True))
     assert at["neck"] == (0, 0.5, 0)
     assert at["head"] == (0, 0.7, 0)
     assert at["left_hip"] == (0.1, 0, 0)
@@ -75,16 +69,12 @@ def slowly(x, skeleton, reference):
     return np.array(rows)
 
 
-@pytest.fixture(params=["hdm05/hdm05", "utkinect/utkinect"])
-def people(request, real_data):
-    """A skeleton, and a clip of each of several people and actions."""
-    bunch = load_trials(real_data / f"{request.param}_positions.npz")
-    return bunch.skeleton, [x.astype(float) for x in bunch.data[::17]]
-
-
+@pytest.mark.parametrize("people", ["hdm05", "utkinect"])
 @pytest.mark.parametrize("reference", ["heading", "world"])
-def test_features_of_people_equal_a_slow_computation(people, reference):
-    skeleton, X = people
-    found = JointPositions(skeleton, reference).fit_transform(X)
+def test_features_of_people_equal_a_slow_computation(request, people, reference):
+    """A clip of each of several people and actions."""
+    bunch = request.getfixturevalue(people)
+    X = [x.astype(float) for x in bunch.data[::17]]
+    found = JointPositions(bunch.skeleton, reference).fit_transform(X)
     for features, x in zip(found, X, strict=True):
-        np.testing.assert_allclose(features, slowly(x, skeleton, reference), atol=1e-12)
+        np.testing.assert_allclose(features, slowly(x, bunch.skeleton, reference), atol=1e-12)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
-from sklearn_motionsync.datasets import load_trials, make_bending
+from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.io import read_motion
 
 from made_bodies import columns_of, standing, turned
@@ -31,13 +31,12 @@ def only(joints, of=PAPER):
     return Skeleton(of.joints, of.parents, {j: of.landmarks[j] for j in joints}, of.up)
 
 
-@pytest.fixture(params=["made", "utkinect/utkinect"], scope="module")
+@pytest.fixture(params=["made", "utkinect"], scope="module")
 def people(request):
     if request.param == "made":
         bunch = make_bending(3, random_state=0)
         return bunch.skeleton, bunch.data
-    folder = request.getfixturevalue("real_data")
-    bunch = load_trials(folder / f"{request.param}_positions.npz")
+    bunch = request.getfixturevalue(request.param)
     return bunch.skeleton, bunch.data[::25]
 
 

@@ -14,7 +14,6 @@ from sklearn_motionsync.io import fill_gaps, find_gaps, read_motion, write_motio
 BENDS = make_bending(3, random_state=0)
 SKELETON, X = BENDS.skeleton, BENDS.data
 JOINTS = list(SKELETON.joints)
-N_JOINTS = len(JOINTS)
 LEVELS = pd.MultiIndex.from_product([["net"], JOINTS, ["x", "y", "z", "likelihood"]])
 SPELLINGS = ["{}_{}", "{}_{X}", "{} {X}", "{}.{}", "{}:{X}", "{}.{X}", "Ann:{}_{}", "Ann:{} {X}"]
 
@@ -25,8 +24,9 @@ def spelt(x, spelling, joints=JOINTS):
     return pd.DataFrame(x, columns=names)
 
 
-def with_quality(x, n_joints=N_JOINTS, levels=LEVELS):
+def with_quality(x, levels=LEVELS):
     """Joints in another order, each with a likelihood that tells its number."""
+    n_joints = x.shape[1] // 3
     parts = [np.c_[x[:, 3 * j : 3 * j + 3], np.full(len(x), (j + 1) / 20)] for j in range(n_joints)]
     table = pd.DataFrame(np.hstack(parts), columns=levels)
     return table.iloc[:, np.arange(4 * n_joints).reshape(-1, 4)[::-1].ravel()]
@@ -74,15 +74,11 @@ def test_tables_of_any_spelling_tell_their_skeleton_and_gaps(form, tmp_path):
     pd.testing.assert_frame_equal(filled, expected)
     write_motion(tmp_path / "a.trc", filled, frame_rate=50)
     read = read_motion(tmp_path / "a.trc")
+    numbers = form(np.arange(3.0 * len(JOINTS))[np.newaxis]).iloc[0].to_numpy()
     for k, joint in enumerate(JOINTS):
         name = next(name for name in read if name.endswith(f"{joint}_z"))
-        np.testing.assert_allclose(read[name], expected_of(filled, form, k), atol=1e-5)
-
-
-def expected_of(filled, form, k):
-    """The z of a joint, found by a table that holds numbers of columns."""
-    numbers = form(np.arange(3.0 * len(JOINTS))[np.newaxis])
-    return filled.iloc[:, int(np.argmax(numbers.iloc[0].to_numpy() == 3 * k + 2))]
+        place = int(np.argmax(numbers == 3 * k + 2))
+        np.testing.assert_allclose(read[name], filled.iloc[:, place], atol=1e-5)
 
 
 def test_gait_events_of_any_form():
@@ -92,7 +88,7 @@ def test_gait_events_of_any_form():
     assert len(expected)
     levels = pd.MultiIndex.from_product([["net"], joints, ["x", "y", "z", "likelihood"]])
     whole = spelt(x, "{} {X}", joints), x.reshape(len(x), -1, 3)
-    for given in (*whole, with_quality(x, len(joints), levels)):
+    for given in (*whole, with_quality(x, levels)):
         found = gait_events(given, walk.skeleton, frame_rate=walk.frame_rate)
         pd.testing.assert_frame_equal(found, expected)
     found = gait_events(spelt(x, "Ann:{}_{X}", joints), frame_rate=walk.frame_rate)

@@ -186,13 +186,6 @@ def test_frames_in_the_first_dimension_are_refused(trials):
             call(array)
 
 
-def test_units_of_labelled_arrays_are_compared(trials):
-    arrays = list(labelled(trials))
-    arrays[3] = arrays[3].assign_attrs(units="rad")
-    with pytest.raises(ValueError, match="the unit 'rad'"):
-        sync().fit(arrays)
-
-
 def test_rows_of_a_labelled_array_of_two_dimensions_are_univariate(trials):
     array = labelled(trials).sel(angle="knee", drop=True)
     expected = LinearSynchronizer().fit_transform(array.values)

@@ -50,13 +50,8 @@ def with_one(trials, i, change):
     return [change(x.copy()) if k == i else x for k, x in enumerate(trials)]
 
 
-def hidden(x):
-    x[20:30, 3:6] = 0
-    return x
-
-
-def frozen(x):
-    x[20:35] = x[20]
+def put(x, place, value):
+    x[place] = value
     return x
 
 
@@ -73,7 +68,10 @@ MADE = {
         named(beside(lambda t, i: 0.8 + 0.2 * np.sin(9 * t + i)), "nose_likelihood"),
         {"feature": "nose_likelihood"},
     ),
-    "fill value": (with_one(BENDS, 2, hidden), {"trial": 2, "first": 20, "last": 29, "value": 0}),
+    "fill value": (
+        with_one(BENDS, 2, lambda x: put(x, np.s_[20:30, 3:6], 0)),
+        {"trial": 2, "first": 20, "last": 29, "value": 0},
+    ),
     "clock": (beside(lambda t, i: t), {"feature": WIDTH}),
     "named clock": (named(beside(lambda t, i: t), "time"), {"kind": "clock", "feature": "time"}),
     "constant": (beside(lambda t, i: 0 * t + 3), {"feature": WIDTH}),
@@ -89,7 +87,10 @@ MADE = {
         with_one(GAIT, 4, lambda x: np.vstack([x, np.repeat(x[-1:], 9, axis=0)])),
         {"trial": 4, "first": len(GAIT[4]), "last": len(GAIT[4]) + 8},
     ),
-    "frozen": (with_one(GAIT, 1, frozen), {"trial": 1, "first": 21, "last": 34}),
+    "frozen": (
+        with_one(GAIT, 1, lambda x: put(x, np.s_[20:35], x[20])),
+        {"trial": 1, "first": 21, "last": 34},
+    ),
     "factor": (with_one(BENDS, 3, lambda x: 1000 * x), {"trial": 3, "value": 1000}),
     "factor of angles": (
         with_one(GAIT, 3, np.deg2rad), {"kind": "factor", "trial": 3, "value": 57.3},

@@ -72,16 +72,6 @@ def test_the_time_puts_frames_in_order_and_keys_name_trials(table, levels):
         assert not x.attrs["resampled"]
 
 
-def test_the_way_back(table, walks):
-    expected = table.set_index([*KEYS, "time"]).sort_index()
-    back = to_frame(walks)
-    assert labels_of(back) == [x.attrs["trial"] for x in walks]
-    pd.testing.assert_frame_equal(back.sort_index(), expected)
-    for again, x in zip(to_trials(back), walks, strict=True):
-        pd.testing.assert_frame_equal(again, x)
-        assert again.attrs["trial"] == x.attrs["trial"]
-
-
 def test_labels_given_to_a_frame_name_their_levels(walks):
     some = walks[:2]
     assert to_frame(some, trials=["a", "b"]).index.names == ["trial", "time"]
@@ -365,8 +355,7 @@ def put(column, value, row=3):
 CALL = "to_trials(df, by=..., time=...)"
 REFUSED = [
     # change of the table, arguments, words
-    (put("subject", None), BY, ["'subject'", "row 3", "Drop these rows"]),
-    (put("trial", np.nan), BY, ["'trial'", "1 of", "row 3"]),
+    (put("subject", None), BY, ["'subject'", "1 of", "row 3", "Drop these rows"]),
     (put("time", np.nan), BY, ["time of trial", "row 3", "df.dropna(subset=['time'])"]),
     (put("time", np.inf), BY, ["infinite", "row 3"]),
     (lambda df: pd.concat([df, df[:1]]), BY, ["twice", "drop_duplicates", "spikes, become rates"]),

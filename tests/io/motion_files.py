@@ -210,9 +210,8 @@ def c3d(
     data = b""
     for frame, samples in zip(points, analog, strict=True):
         values = [*frame.ravel(), *samples.ravel()]
-        data += (
-            b"".join(map(number, values)) if real else whole(*(round(x) % 65536 for x in values))
-        )
+        integers = (round(x) % 65536 for x in values)
+        data += b"".join(map(number, values)) if real else whole(*integers)
     data += bytes(-len(data) % 512)
     if rotations is not None:
         data += b"".join(map(number, rotations.ravel()))
@@ -284,16 +283,10 @@ def trc(positions, names, rate=50, times=None, units="mm", blank="", digits=3, *
     """A TRC file of positions (n_frames, n_markers, 3); NaN is `blank`."""
     n_frames, n_markers = positions.shape[:2]
     times = np.arange(n_frames) / rate if times is None else times
-    header = {
-        "DataRate": f"{rate:.2f}",
-        "CameraRate": f"{rate:.2f}",
-        "NumFrames": n_frames,
-        "NumMarkers": n_markers,
-        "Units": units,
-        "OrigDataRate": f"{rate:.2f}",
-        "OrigDataStartFrame": 1,
-        "OrigNumFrames": n_frames,
-    } | header
+    rates = dict.fromkeys(["DataRate", "CameraRate"], f"{rate:.2f}")
+    counts = {"NumFrames": n_frames, "NumMarkers": n_markers, "Units": units}
+    original = {"OrigDataRate": f"{rate:.2f}", "OrigDataStartFrame": 1, "OrigNumFrames": n_frames}
+    header = rates | counts | original | header
     lines = ["PathFileType\t4\t(X/Y/Z)\ttrial.trc", "\t".join(header)]
     lines += ["\t".join(map(str, header.values()))]
     lines += ["Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t"]

@@ -80,7 +80,7 @@ def test_chain_bends_to_half_a_circle_in_more_frames_than_one_block(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_random_trees_agree_with_plain_matrices(tmp_path, benchmark, seed):
+def test_random_trees_agree_with_plain_matrices(tmp_path, seed):
     """Channels in any number and order, several roots."""
     rng = np.random.default_rng(seed)
     names = [axis + kind for axis in "XYZ" for kind in ("position", "rotation")]

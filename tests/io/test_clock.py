@@ -41,12 +41,6 @@ def written(ending):
     return write
 
 
-def trimmed(df, folder):
-    df = df.copy()
-    df.iloc[:3] = np.nan
-    return [fill_gaps(df, 0, ends="trim")]
-
-
 WAYS = {
     "whole": lambda df, folder: [df],
     "rows": lambda df, folder: [df.iloc[7:40]],
@@ -54,7 +48,7 @@ WAYS = {
     "cut": lambda df, folder: cut_at_events(df, "Foot Strike"),
     "cut from rows": lambda df, folder: cut_at_events(df.iloc[2:], "Foot Strike"),
     "cut twice": lambda df, folder: [cut.iloc[3:] for cut in cut_at_events(df, "Foot Strike")],
-    "trimmed": trimmed,
+    "trimmed": lambda df, folder: [fill_gaps(df[3:].reindex(df.index), 0, ends="trim")],
     "another rate": lambda df, folder: to_trials(df, frame_rate=20),
     "rows at another rate": lambda df, folder: to_trials(df.iloc[9:], frame_rate=80),
     "TRC": written(".trc"),

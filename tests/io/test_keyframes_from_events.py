@@ -181,10 +181,8 @@ def test_events_of_cut_cycles(gait_cycles):
     truth = gait.keyframes[:, is_toe_off].ravel() - [x.attrs["rows"][0] for x in cycles]
     np.testing.assert_allclose(found.to_numpy()[:, 0], truth, atol=1e-4)
     assert found.index.to_list() == [x.attrs["trial"] for x in cycles]
-    pd.testing.assert_series_equal(
-        keyframes_from_events(cycles, names=["foot off"])["foot off"],
-        found[("Foot Off", "Right")].rename("foot off"),
-    )
+    named = keyframes_from_events(cycles, names=["foot off"])
+    np.testing.assert_array_equal(named["foot off"], found["Foot Off", "Right"])
     with pytest.raises(ValueError, match=r"'Right'\) comes twice, in rows .* by cut_at_events"):
         keyframes_from_events(takes)
     with pytest.raises(ValueError, match="Trial 0: by its index row 0 is frame 5 of the rec"):

@@ -31,7 +31,7 @@ def joints_of(df, skeleton):
 
 
 @pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
-def test_bvh_is_read_back(tmp_path, benchmark, order):
+def test_bvh_is_read_back(tmp_path, order):
     """Hinges, which turn about all axes then, joints that move in their parents or not at all."""
     df = read_motion(put(tmp_path, body(order)))
     again = written(tmp_path, df)
@@ -45,7 +45,7 @@ def test_bvh_is_read_back(tmp_path, benchmark, order):
     np.testing.assert_allclose(plain.reshape(len(df), -1), again, atol=1e-9)
 
 
-def test_file_of_people_is_read_back(tmp_path, real_data, benchmark):
+def test_file_of_people_is_read_back(tmp_path, real_data):
     """142 joints; positions within 1e-4 of a leg, also by a reader that shares no code."""
     (path,) = (real_data / "original_files" / "bvh").glob("*.bvh")
     df = read_motion(path).iloc[:60]

@@ -136,28 +136,19 @@ def test_busy_workers_keep_no_data_after_a_fit(client, request):
 
 
 def test_warping_sends_every_trial_to_one_worker(client):
-    X = walks(100, 60, 8)
-    many = np.concatenate([X] * 6)
-    sync = DenseSynchronizer().fit(X)
-    expected = sync.transform(many)
-    before = received(client) - moved(client)
-    with joblib.parallel_config(backend="dask"):
-        warped = sync.transform(many)
-    # joblib chooses the worker of a portion; if that one is busy, Dask moves it.
-    assert (received(client) - moved(client) - before).sum() <= 1.1 * many.nbytes
-    assert warped.tobytes() == expected.tobytes()
-
-
-def test_large_portions_of_warping_are_sent_ahead_of_their_tasks(client):
     X = walks(30, 60, 150)
     many = np.concatenate([X] * 20)
     sync = DenseSynchronizer(n_frames=40).fit(X)
+    expected = sync.transform(many)
+    before = received(client) - moved(client)
     with warnings.catch_warnings(record=True) as caught, joblib.parallel_config(backend="dask"):
         warnings.simplefilter("always")
         warped = sync.transform(many)
-    # Dask warns of tasks of more than 10 MB, which pass through its scheduler.
+    # joblib chooses the worker of a portion; if that one is busy, Dask moves it.
+    assert (received(client) - moved(client) - before).sum() <= 1.1 * many.nbytes
+    # Ahead of their tasks: Dask warns of tasks of more than 10 MB, through its scheduler.
     assert [str(each.message) for each in caught if "graph" in str(each.message)] == []
-    assert warped.tobytes() == sync.transform(many).tobytes()
+    assert warped.tobytes() == expected.tobytes()
 
 
 # -- streams of portions ------------------------------------------------------------------------

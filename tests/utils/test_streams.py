@@ -54,14 +54,6 @@ def files(fitted, tmp_path):
     return tmp_path / "synchronizer.joblib", tmp_path / "walks", tmp_path / "out"
 
 
-def run(*arguments):
-    """The script, or code that imports it, in a process of its own."""
-    paths = [str(PACKAGE), str(SCRIPT.parent), os.environ.get("PYTHONPATH", "")]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-
-
 def assert_synchronized(folder, fitted):
     assert sorted(path.name for path in folder.glob("*.np*")) == [f"{x}.npy" for x in "abcd"]
     for name, portion in PORTIONS.items():
@@ -114,7 +106,11 @@ list(stream_files.stream(*sys.argv[1:]))
 
 def test_stream_continues_after_a_kill(files, fitted):
     _, _, out = files
-    assert run("-c", KILLED, *files).returncode != 0
+    paths = [str(PACKAGE), str(SCRIPT.parent), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    command = [sys.executable, "-c", KILLED, *map(str, files)]
+    killed = subprocess.run(command, env=environment, capture_output=True, check=False)
+    assert killed.returncode != 0
     done = {path.name: path.stat().st_mtime_ns for path in out.glob("*.npy")}
     assert sorted(done) == ["a.npy", "b.npy"]
     assert len(list(out.glob("*.part"))) == 1
