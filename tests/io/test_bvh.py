@@ -184,9 +184,7 @@ def test_small_file_with_a_huge_result_is_refused(tmp_path):
 
 
 def test_real_file_agrees_with_the_archive(real_data):
-    path = real_data / "original_files" / "bvh" / "007_01.bvh"
-    df = read_motion(path)
-    assert df.shape == (157, 3 * 142)
+    df = read_motion(real_data / "original_files" / "bvh" / "007_01.bvh")
     assert df.attrs["frame_rate"] == pytest.approx(60, rel=1e-4)
     archive = load_trials(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
     columns = [f"{j}_{axis}" for j in archive.joints for axis in "xyz"]

@@ -34,10 +34,6 @@ EVENTS = [[k + 3, 15] for k in range(N)]
 Y, FEW = [0, 0, 0, 1, 1, 1], {"n_permutations": 19}
 
 
-def first_of(labels):
-    return next(iter(labels)) if hasattr(labels, "__iter__") else labels
-
-
 def report(**given):
     with TemporaryDirectory() as folder:
         write_report(Path(folder) / "report.html", SYNC, X, **given)
@@ -64,7 +60,7 @@ METHODS = {
     "compare_events(groups)": (lambda p: compare_events(X, EVENTS, Y, groups=p, **FEW), True),
     "compare_groups(y)": (lambda g: compare_groups(SYNC, X, g, **FEW), True),
     "compare_groups(groups)": (lambda p: compare_groups(SYNC, X, Y, groups=p, **FEW), True),
-    "compare_to_norm(y)": (lambda g: compare_to_norm(SYNC, X, g, norm=first_of(g)), True),
+    "compare_to_norm(y)": (lambda g: compare_to_norm(SYNC, X, g, norm=next(iter(g))), True),
     "compare_to_norm(groups)": (lambda p: compare_to_norm(SYNC, X, Y, norm=0, groups=p), True),
     "write_report(y)": (lambda g: report(y=g), True),
     "write_report(groups)": (lambda p: report(groups=p), False),
