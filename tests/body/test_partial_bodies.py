@@ -26,6 +26,11 @@ PARTS = {
 }
 
 
+def without(*joints):
+    x = make_bending(1, random_state=1).data[0]
+    return columns_of(x).drop(columns=[f"{j}_{a}" for j in joints for a in "xyz"])
+
+
 def only(joints, of=PAPER):
     """The skeleton of a whole body that knows these landmarks only."""
     return Skeleton(of.joints, of.parents, {j: of.landmarks[j] for j in joints}, of.up)
@@ -156,13 +161,12 @@ def test_landmark_of_two_joints_is_their_mean():
 
 
 def test_missing_pelvis_and_neck_are_the_middle_of_their_pairs():
-    x = make_bending(1, random_state=1).data[0]
-    df = columns_of(x).drop(columns=[f"{j}_{a}" for j in ("pelvis", "neck") for a in "xyz"])
+    df = without("pelvis", "neck")
     skeleton = Skeleton.from_frame(df)
     assert skeleton.landmarks["pelvis"] == ("left_hip", "right_hip")
     assert skeleton.landmarks["neck"] == ("left_shoulder", "right_shoulder")
     # The made people have their pelvis and neck in the middle.
-    expected = DirectionCosines(PAPER).fit_transform(x)
+    expected = DirectionCosines(PAPER).fit_transform(without())
     np.testing.assert_allclose(DirectionCosines(skeleton).fit_transform(df), expected, atol=0.05)
     told = Skeleton.from_frame(df, landmarks={"left_hip": ("left_hip", "left_knee")})
     assert told.landmarks["pelvis"] == ("left_hip", "left_knee", "right_hip")
@@ -170,11 +174,6 @@ def test_missing_pelvis_and_neck_are_the_middle_of_their_pairs():
 
 
 # -- guessed from names -------------------------------------------------------------------
-
-
-def without(*joints):
-    x = make_bending(1, random_state=1).data[0]
-    return columns_of(x).drop(columns=[f"{j}_{a}" for j in joints for a in "xyz"])
 
 
 def test_landmark_guessed_on_one_side_only_is_refused():

@@ -33,7 +33,6 @@ def recording(index=None):
 ROWS = [
     ("all", slice(None), RATE),
     ("behind", slice(10, None), RATE),
-    ("before", slice(None, 20), RATE),
     ("thinned out", slice(3, None, 4), RATE / 4),
     ("reversed", slice(None, None, -1), RATE),
     ("thinned out backwards", slice(None, None, -3), RATE / 3),
@@ -42,7 +41,6 @@ ROWS = [
     ("the same two", [3, 3], None),
     ("with a hole", [0, 1, 2, 5, 6], None),
     ("shuffled", [4, 0, 2, 1, 3], None),
-    ("twice", [1, 1, 1], None),
 ]
 
 
@@ -133,7 +131,6 @@ def in_dates(df):
 
 UNEVEN = [
     (lambda df: df.iloc[::-1], "not in order of time.*'frame'.* follows.*sort_index"),
-    (lambda df: df.sample(frac=1, random_state=0), "not in order of time"),
     (lambda df: pd.concat([df.iloc[20:], df.iloc[:20]]), "0 follows"),
     (lambda df: in_seconds(df, 30).iloc[::-1], "not in order of time.*'time'"),
     (lambda df: df.drop(df.index[5:7]), "not even: from 4 to 7 it is 3, mostly 1"),

@@ -117,6 +117,8 @@ def test_analog_channels_have_the_clock_of_the_markers(tmp_path):
         for event in part.attrs["events"]:
             seconds = part.attrs["first_time"] + event["frame"] / 200
             assert seconds == pytest.approx(event["time"], abs=1e-5)
+    for part in cut_at_events(df, "Foot Strike"):
+        assert part.attrs["first_frame"] == 1 + int(RATE * part.iloc[0, 0] + 1e-3)
 
 
 @pytest.mark.parametrize("rows", [slice(None), slice(11, None), slice(3, None, 2)])

@@ -4,9 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import to_frame
-from sklearn_motionsync.io import cut_at_events, read_motion
-
-from motion_files import c3d, everything, floats, put, texts
+from sklearn_motionsync.io import cut_at_events
 
 STRIKE, OFF, LEFT = "Foot Strike", "Foot Off", ("Foot Strike", "Left")
 
@@ -126,27 +124,6 @@ def test_labels_follow_those_of_the_recording():
 def test_wrong_events_are_refused(df, start, stop, message):
     with pytest.raises(ValueError, match=message):
         cut_at_events(df, start, stop)
-
-
-@pytest.mark.parametrize("group", ["markers", "analog"])
-def test_groups_of_a_file_are_cut_at_the_same_times(tmp_path, group):
-    content = everything()
-    content["others"]["EVENT"] |= {
-        "LABELS": texts("Strike", "Off", "Strike"),
-        "TIMES": floats(0, 2.108, 0, 2.3, 0, 2.512),
-    }
-    path = put(tmp_path, c3d(**content), "a.c3d")
-    df = read_motion(path, group=group, max_gap=9 if group == "markers" else 0)
-    (part,) = cut_at_events(df, "Strike")
-    k = 2 if group == "analog" else 1
-    bounds = [np.floor((t * 50 - 100) * k + 0.5) for t in (2.108, 2.512)]
-    assert part.attrs["rows"] == bounds
-    assert part.attrs["first_frame"] == 101 + bounds[0] // k
-    assert [e["frame"] for e in part.attrs["events"]] == [15 * k - bounds[0]]
-    np.testing.assert_array_equal(part, df.iloc[int(bounds[0]) : int(bounds[1]) + 1])
-    (same,) = cut_at_events(df.iloc[3:], "Strike")
-    pd.testing.assert_frame_equal(part, same)
-    assert part.attrs == same.attrs
 
 
 def test_messages_name_the_recording_and_are_short_whatever_is_marked():

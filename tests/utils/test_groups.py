@@ -79,7 +79,6 @@ REFUSED = [
     (list("abcde"), "{0} must have one label for each trial, got 5 for 6"),
     ("abcdef", "{0} must be a list or 1-D array .* got 'abcdef'"),
     (dict.fromkeys(range(6)), "{0} must be a list or 1-D array .* got {{"),
-    (set(range(6)), "{0} must be a list or 1-D array .* got {{"),
     (np.zeros((6, 2)), r"{0} must be a list or 1-D array .* got shape \(6, 2\)"),
     ([["a"], ["b"]] * 3, r"{0}\[0\] is \['a'\]: a label is one"),
     ([0, 1, 2, 3, [4], 5], r"{0}\[4\] is \[4\]: a label is one"),
