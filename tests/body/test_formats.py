@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import Skeleton
 from sklearn_motionsync.body.formats import FORMATS
-from sklearn_motionsync.datasets import load_trials, make_bending
+from sklearn_motionsync.datasets import make_bending
 
 from made_bodies import columns_of
 
@@ -127,11 +127,3 @@ def test_landmarks_of_other_names_are_guessed(joints, landmarks):
     df = pd.DataFrame(0.0, index=[0], columns=[f"{j}_{a}" for j in joints for a in "xyz"])
     found = Skeleton.from_frame(df).landmarks
     assert found == {**found, **landmarks}
-
-
-@pytest.mark.parametrize(
-    ("archive", "name"), [("hdm05/hdm05", "acclaim"), ("utkinect/utkinect", "kinect")]
-)
-def test_joints_and_parents_are_those_of_real_recordings(real_data, archive, name):
-    bunch = load_trials(real_data / f"{archive}_positions.npz")
-    assert bunch.skeleton == getattr(Skeleton, name)()

@@ -57,7 +57,6 @@ def test_sections_of_nexus_are_read_in_any_order(tmp_path, separator, order):
     [
         ("deg", "x", "angles"),
         ("N/kg", "x", "forces"),
-        ("N", "x", "forces"),
         ("N.mm/kg", "x", "moments"),
         ("Nm", "x", "moments"),
         ("W/kg", "LHipPower", "powers"),

@@ -34,7 +34,6 @@ def test_columns_and_times_are_read(tmp_path):
         ("indegrees = NO", LABELS, "rad"),
         ("inDegrees yes", LABELS, "deg"),
         ("inDegrees\t=\tn", LABELS, "rad"),
-        ("inDegrees\ty", LABELS, "deg"),
         ("inDegrees=perhaps", LABELS, None),
         ("inDegrees=yes", FORCES, None),
     ],
