@@ -60,6 +60,8 @@ def test_means_of_an_array_equal_single_means():
     for k in range(5):
         alone = mean_direction(u[:, k], weights[:, k])
         np.testing.assert_allclose(found[k], alone, atol=1e-13)
+    for dims in (2, 3):
+        assert mean_direction(np.empty((2, 0, dims)), np.full((2, 1), 0.5)).shape == (0, dims)
 
 
 def test_length_of_a_mean_vector_is_the_mean_length():
@@ -68,8 +70,3 @@ def test_length_of_a_mean_vector_is_the_mean_length():
     np.testing.assert_allclose(np.linalg.norm(found), 2.5, rtol=1e-15)
     # Extrapolated lengths stay above 0: they are at least half the shortest.
     assert np.linalg.norm(mean_vector(u * [[4.0], [9.0]], np.array([2, -1]))) == pytest.approx(2)
-
-
-def test_means_of_no_directions_are_none():
-    for dims in (2, 3):
-        assert mean_direction(np.empty((2, 0, dims)), np.full((2, 1), 0.5)).shape == (0, dims)

@@ -133,15 +133,11 @@ def test_a_known_rate_is_changed_without_times():
         to_trials(dates, frame_rate=50)
 
 
-def test_a_rate_that_a_parameter_says_counts():
+def test_the_rate_of_a_parameter_counts_and_times_replace_it():
     X = tables(ASpace(), RATE)
     for estimator in (OnlineSynchronizer(frame_rate=60), MotionTracker(frame_rate=60)):
         with pytest.warns(UserWarning, match="30 frames a second, and frame_rate is 60"):
             estimator.fit(X)
-
-
-def test_times_replace_the_rate():
-    X = tables(ASpace(), RATE)
     fast = [df.iloc[::2] for df in X[:2]]
     online = OnlineSynchronizer(LinearSynchronizer()).fit(X)
     tracker = MotionTracker(LinearSynchronizer(), n_particles=10).fit(X)

@@ -108,9 +108,7 @@ def test_numbers_that_may_be_seconds_are_in_steps_below_one(first, step, rate):
 def test_what_the_index_does_not_tell_is_not_known(index):
     assert recorded_frames(recording(index)) is None
     assert frame_rate_of_rows(recording(index)) is None
-
-
-def test_a_frame_rate_is_a_number_above_0_of_a_table():
+    # Nor is a rate that is no number above 0, or that of an array.
     df = recording()
     for rate in (None, 0, np.inf, "120", True):
         df.attrs["frame_rate"] = rate

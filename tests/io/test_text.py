@@ -120,11 +120,8 @@ def test_tables_of_several_portions_are_one(tmp_path, monkeypatch, end):
     text = opened(tmp_path, "\n".join(lines) + end)
     np.testing.assert_array_equal(text.table(5, "a frame"), values)
     assert text.line_number == len(lines)
-
-
-def test_an_empty_table_has_its_columns(tmp_path):
-    for content in ("", " \n\n", "\n"):
-        assert opened(tmp_path, content).table(3, "a frame").shape == (0, 3)
+    for nothing in ("", " \n\n", "\n"):
+        assert opened(tmp_path, nothing).table(3, "a frame").shape == (0, 3)
 
 
 def test_results_are_in_proportion_to_their_file():
