@@ -85,7 +85,6 @@ _NOW = {
     "LagDisplay": "display.LagDisplay",
     "Lags": "synchronizers.Lags",
     "LivePhase": "live.LivePhase",
-    "MetricDisplay": "display.MetricDisplay",
     "MotionTracker": "live.MotionTracker",
     "NormComparison": "comparison.NormComparison",
     "NormDisplay": "display.NormDisplay",

@@ -22,7 +22,6 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import (
     ActionModelDisplay,
-    MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
@@ -79,8 +78,7 @@ def flat():
 def said_of(pipe, X):
     scores = [scorer(pipe, X) for scorer in (SpreadScorer(), FeatureHoldoutScorer())]
     model = ActionModelDisplay.from_estimator(pipe, X, features="pelvis_height")
-    times, share = Match.from_estimator(pipe, X).times, MetricDisplay.from_estimator(pipe).share
-    return [scores, times, share, model.trials]
+    return [scores, Match.from_estimator(pipe, X).times, model.trials]
 
 
 @pytest.mark.parametrize("name", NESTINGS)
@@ -93,7 +91,6 @@ def test_synchronizer_is_found_in_nested_pipelines(name, flat):
     figures = SynchronizationDisplay.from_estimator(pipe, FEW.data)
     assert figures.ylabels == ["aspace0", "aspace1", "aspace2", "aspace3"]
     assert TrellisDisplay.from_estimator(pipe, FEW.data).space.costs.shape[0] == 40
-    assert sorted(MetricDisplay.from_estimator(pipe).feature_names) == figures.ylabels
     assert len(SkeletonDisplay.from_estimator(pipe, FEW.data).axes_) == 2
     assert len(SkeletonDisplay.from_model(pipe).axes_) == 4
 

@@ -10,7 +10,6 @@ from .gait import GaitDisplay
 from .groups import GroupDisplay, NormDisplay
 from .lags import LagDisplay
 from .live import PhaseDisplay
-from .metric import MetricDisplay
 from .model import ActionModelDisplay
 from .search import SearchDisplay
 from .stick_figures import SkeletonDisplay
@@ -24,7 +23,6 @@ __all__ = [
     "GaitDisplay",
     "GroupDisplay",
     "LagDisplay",
-    "MetricDisplay",
     "NormDisplay",
     "PhaseDisplay",
     "SearchDisplay",

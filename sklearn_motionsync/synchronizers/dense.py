@@ -210,7 +210,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
     --------
     LinearSynchronizer : The baseline without matching, also between key-frames.
     ActionModel : Mean and variation of aligned trials.
-    sklearn_motionsync.display.MetricDisplay : Draws the weights of the signals in the metric.
 
     Notes
     -----

@@ -20,7 +20,6 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import (
-    MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
@@ -39,7 +38,6 @@ ESTIMATORS = {
     "CycleDisplay": None,
     "GroupDisplay": DenseSynchronizer(),
     "LagDisplay": PartSynchronizer(),
-    "MetricDisplay": DenseSynchronizer(),
     "PhaseDisplay": OnlineSynchronizer(),
     "SearchDisplay": None,
     "SkeletonDisplay": make_pipeline(DirectionCosines(PAPER), DenseSynchronizer()),
@@ -89,18 +87,14 @@ def test_nan_is_drawn_as_a_gap():
     display.figure_.canvas.draw()
 
 
-@pytest.mark.parametrize(
-    "draw",
-    [
-        lambda pipe, **features: MetricDisplay.from_estimator(pipe, **features),
-        lambda pipe, **features: SynchronizationDisplay.from_estimator(pipe, POSITIONS, **features),
-    ],
-)
-def test_unknown_feature_is_refused(pipe, draw):
+def test_unknown_feature_is_refused(pipe):
+    def draw(features):
+        SynchronizationDisplay.from_estimator(pipe, POSITIONS, features=features)
+
     for bad in (3, -1, 1.5, True, "aspace9", [0, "x1"]):
         message = "There is no feature .*there are 3: aspace0, aspace1, aspace2"
-        refuses(lambda features=bad: draw(pipe, features=features), message)
-    refuses(lambda: draw(pipe, features=[]), "at least one feature")
+        refuses(lambda features=bad: draw(features), message)
+    refuses(lambda: draw([]), "at least one feature")
 
 
 @pytest.mark.parametrize("trial", [4, -1, 1.5, "1", None])
@@ -116,12 +110,11 @@ def test_every_display_is_drawn_of_an_estimator_but_those_of_a_comparison_and_of
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_from_estimator_refuses_other_and_unfitted_estimators(name):
     from_estimator = getattr(display, name).from_estimator
-    trials = [] if name == "MetricDisplay" else [POSITIONS]
     if name != "SearchDisplay":
-        refuses(lambda: from_estimator(3, *trials), "got int|There is no .* in int")
+        refuses(lambda: from_estimator(3, [POSITIONS]), "got int|There is no .* in int")
     if ESTIMATORS[name] is not None:
         with pytest.raises(NotFittedError):
-            from_estimator(ESTIMATORS[name], *trials)
+            from_estimator(ESTIMATORS[name], [POSITIONS])
 
 
 # -- stick figures --------------------------------------------------------------------------

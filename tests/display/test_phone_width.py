@@ -103,9 +103,6 @@ DRAWN = {
     "gait": lambda pipe, poses: display.GaitDisplay.from_positions(
         WALK.data, WALK.skeleton, frame_rate=100
     ),
-    "metric": lambda pipe, poses: display.MetricDisplay.from_estimator(
-        make_pipeline(*pipe[:1], DenseSynchronizer(30)).fit(BUNCH.data)
-    ),
     "trellis": lambda pipe, poses: display.TrellisDisplay.from_estimator(
         pipe[:-1], BUNCH.data, trial=1
     ),
