@@ -102,15 +102,13 @@ print(np.round(seconds_off, 2))
 # The dial, and the rest
 # ----------------------
 # The arc outside the dial ends at the phase a moment later, as does the pale body. Orange is
-# predicted: the mean of the known people, with a band that holds nine of ten. The dashed curve is
-# what came.
+# predicted: the mean of the known people. The dashed curve is what came.
 
 frame = 45
 done = percent_done(live.track([person])[0].phase)[frame]
 display = PhaseDisplay.from_estimator(
     live,
     person,
-    training=X,
     body=cosines,
     features=["torso_y", "left_forearm_z"],
     names=["on the way up"],
@@ -127,13 +125,12 @@ _ = display.figure_.suptitle(
 # A person who stops half-way
 # ---------------------------
 # The phase stands still soon after the person does. The confidence falls, and the predicted rest
-# does not come. The dashed path assumes that each trial ends, so it is not the truth here.
+# does not come.
 
 stopped = np.concatenate([person[:45], np.repeat(person[44:45], 60, axis=0)])
 both = PhaseDisplay.from_estimator(
     live,
     [person, stopped],
-    training=X,
     body=cosines,
     features="left_forearm_z",
     names=["a bend", "stops half-way"],

@@ -51,7 +51,7 @@ print(lags.summary().round(2))
 # %%
 # Each part over time
 # -------------------
-# Red is late. Hatched lags have an interval that holds 0.
+# Above zero a part is late. Where the grey interval holds zero, the lag cannot be told from none.
 
 display = LagDisplay(lags).plot()
 icc = lags.summary()["icc"]

@@ -266,7 +266,7 @@ def nothing_is_drawn():
     with pytest.MonkeyPatch.context() as patch:
         for kind in (getattr(display, name) for name in display.__all__):
             patch.setattr(kind, "plot", lambda self, *args, **kwargs: self)
-        for name in ("draw_signals", "draw_offsets", "picture"):
+        for name in ("draw_signals", "picture"):
             patch.setattr(f"sklearn_motionsync.report.report.{name}", lambda *args: "")
         yield
 

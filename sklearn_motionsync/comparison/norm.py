@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -226,32 +226,26 @@ def compare_to_norm(
         features=features,
         unit=unit,
     )
-    study = _Subjects.of(y, norm, groups, len(aligned.curves))
-    return _compare(aligned, study, float(level))
-
-
-def _compare(aligned, study, level):
-    """The comparison of trials that are matched already: `AlignedCurves`."""
+    norm_trials, subjects = _people_of_norm(y, norm, groups, len(aligned.curves))
     timing = aligned.offsets[:, :, np.newaxis]
     values = np.concatenate([aligned.curves, timing], axis=2).astype(np.float64, copy=False)
-    of_norm = [values[trials] for trials in study.of_norm]
-    subjects = [values[trials] for trials in study.of_subjects]
+    of_norm = [values[trials] for trials in norm_trials]
     mean, std = _of_norm(np.stack([x.mean(axis=0) for x in of_norm]))
-    curves = np.stack([x.mean(axis=0) for x in subjects])
+    curves = np.stack([values[trials].mean(axis=0) for *_, trials in subjects])
     z = (curves - mean) / std
-    counts = [len(x) for x in subjects]
-    p, limits = _chances(z, counts, of_norm, level)
+    counts = [len(trials) for *_, trials in subjects]
+    p, limits = _chances(z, counts, of_norm, float(level))
     joint = np.minimum(1, 2 * p.min(axis=1))
-    columns = {"group": study.groups, "n_trials": counts, "p": joint}
+    columns = {"group": [group for _, group, _ in subjects], "n_trials": counts, "p": joint}
     columns |= {"p_shape": p[:, 0], "p_timing": p[:, 1], "differs": joint <= level}
-    subject = pd.Index(study.labels, name="subject")
-    verdicts = pd.DataFrame(columns, index=subject)
+    index = pd.Index([label for label, *_ in subjects], name="subject")
+    verdicts = pd.DataFrame(columns, index=index)
     names, units = [*aligned.names, "offset"], [*aligned.units, UNITS[aligned.unit]]
     return NormComparison(
         verdicts=verdicts,
         departures=_departures(z, curves - mean, limits, verdicts, names, units, aligned),
-        profile=_profile(curves, of_norm, aligned, study, names, units, verdicts.index),
-        level=level,
+        profile=_profile(curves, of_norm, aligned, norm_trials, subjects, names, units),
+        level=float(level),
         n_people=len(of_norm),
         unit=aligned.unit,
         clock=aligned.clock,
@@ -316,51 +310,32 @@ def _largest_deviations(of_people, k):
     return LogMoments(len(means), float(mean), float(weights @ np.square(logs - mean)))
 
 
-class _Subjects(NamedTuple):
-    """Whose trials are whose.
-
-    Attributes
-    ----------
-    of_norm, of_subjects : list of ndarray of int
-        The trials of each person of the norm, and of each subject.
-    labels, groups : list
-        Of the subjects.
-    """
-
-    of_norm: list
-    of_subjects: list
-    labels: list
-    groups: list
-
-    @classmethod
-    def of(cls, y, norm, groups, n):
-        codes, names = encode_groups(y, n, name="y", at_least=2)
-        if norm not in names:
-            raise ValueError(f"norm={norm!r} is none of the labels {names[:6]} in y.")
-        persons, labels = encode_groups(groups, n, at_least=2)
-        if groups is not None:
-            refuse_classes_as_people(codes, persons)
-        in_norm = codes == names.index(norm)
-        of_norm, of_subjects, subjects, groups_of_subjects = [], [], [], []
-        for person, label in enumerate(labels):
-            trials = np.flatnonzero(persons == person)
-            if len(set(codes[trials])) > 1:
-                several = [names[code] for code in sorted(set(codes[trials]))]
-                raise ValueError(
-                    f"groups: {label!r} has trials of the labels {several} in y. Give people one "
-                    f"name a label, such as '{label} {several[0]}'."
-                )
-            if in_norm[trials[0]]:
-                of_norm.append(trials)
-            else:
-                of_subjects.append(trials)
-                subjects.append(label)
-                groups_of_subjects.append(names[codes[trials[0]]])
-        if len(of_norm) < _FEWEST:
+def _people_of_norm(y, norm, groups, n):
+    """The trials of each person of the norm, and the label, the group and those of each subject."""
+    codes, names = encode_groups(y, n, name="y", at_least=2)
+    if norm not in names:
+        raise ValueError(f"norm={norm!r} is none of the labels {names[:6]} in y.")
+    persons, labels = encode_groups(groups, n, at_least=2)
+    if groups is not None:
+        refuse_classes_as_people(codes, persons)
+    of_norm, subjects = [], []
+    for person, label in enumerate(labels):
+        trials = np.flatnonzero(persons == person)
+        several = [names[code] for code in sorted(set(codes[trials]))]
+        if len(several) > 1:
             raise ValueError(
-                f"The norm needs at least {_FEWEST} people, got {len(of_norm)} in {norm!r}."
+                f"groups: {label!r} has trials of the labels {several} in y. Give people one "
+                f"name a label, such as '{label} {several[0]}'."
             )
-        return cls(of_norm, of_subjects, subjects, groups_of_subjects)
+        if several[0] == norm:
+            of_norm.append(trials)
+        else:
+            subjects.append((label, several[0], trials))
+    if len(of_norm) < _FEWEST:
+        raise ValueError(
+            f"The norm needs at least {_FEWEST} people, got {len(of_norm)} in {norm!r}."
+        )
+    return of_norm, subjects
 
 
 def _departures(z, differences, limits, verdicts, names, units, aligned):
@@ -402,19 +377,18 @@ def _departures(z, differences, limits, verdicts, names, units, aligned):
     return pd.DataFrame(rows, columns=_COLUMNS)
 
 
-def _profile(curves, of_norm, aligned, study, names, units, labels):
+def _profile(curves, of_norm, aligned, norm_trials, subjects, names, units):
     """Root mean squares of differences from the mean of the norm, by subject and feature."""
     means = np.stack([x.mean(axis=0) for x in of_norm])
     even = aligned.even.astype(np.float64, copy=False)
-    of_even = [
-        [even[trials].mean(axis=0) for trials in people]
-        for people in (study.of_norm, study.of_subjects)
-    ]
+    mean = np.mean([even[trials].mean(axis=0) for trials in norm_trials], axis=0)
+    of_subjects = np.stack([even[trials].mean(axis=0) for *_, trials in subjects])
     linear = np.full((len(curves), len(names)), np.nan)
-    linear[:, :-1] = _root_mean_squares(np.stack(of_even[1]) - np.mean(of_even[0], axis=0))
+    linear[:, :-1] = _root_mean_squares(of_subjects - mean)
     n = len(means)
     without_one = (means.sum(axis=0) - means) / (n - 1)
     typical = np.median(_root_mean_squares(means - without_one), axis=0)
+    labels = [label for label, *_ in subjects]
     index = pd.MultiIndex.from_product([labels, names], names=["subject", "feature"])
     return pd.DataFrame(
         {

@@ -1,8 +1,8 @@
 """Displays of synchronizers, models and trackers: computed once, drawn any number of times.
 
-As in scikit-learn, ``from_estimator`` checks its arguments, computes and draws. Constructors store
-their arguments without checks, and ``plot`` draws again. The artists are attributes with a trailing
-underscore. matplotlib, in the extra ``plot``, is imported on drawing.
+As in scikit-learn, ``from_estimator`` checks its arguments, computes and draws, and ``plot`` draws
+again. What is drawn are attributes, and the artists are those with a trailing underscore.
+matplotlib, in the extra ``plot``, is imported on drawing.
 """
 
 from .cycles import CycleDisplay

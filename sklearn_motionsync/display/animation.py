@@ -73,12 +73,11 @@ def _animate(figure, show, count, fps, *, closes):
 
     class NotebookAnimation(FuncAnimation):
         def save(self, *args, **kwargs):
-            # The layout takes longer than the drawing, and each picture would repeat it.
+            # The layout takes longer than the drawing, and each picture would repeat it. And
+            # drawing a picture on the canvas before it is saved would double the time.
             layout = figure.get_layout_engine()
             figure.draw_without_rendering()
-            figure.get_layout_engine = _do_nothing
-            # Saving a picture draws it; drawing it on the canvas before would double the time.
-            figure.canvas.draw_idle = _do_nothing
+            figure.get_layout_engine = figure.canvas.draw_idle = lambda: None
             try:
                 super().save(*args, **kwargs)
             finally:
@@ -103,10 +102,6 @@ def _animate(figure, show, count, fps, *, closes):
     )
 
 
-def _do_nothing(*args, **kwargs):
-    """Replaces a method for a while."""
-
-
 # -- the buttons of the player -----------------------------------------------------------
 
 # SVG paths of the icons in a box of 14 by 12, by Matplotlib's names.
@@ -122,7 +117,6 @@ _ICON_PATHS = {
     "plus": "M1 5h5V0h2v5h5v2H8v5H6V7H1z",
 }
 _FONT_LINK = re.compile(r"<link[^>]*font-awesome[^>]*>")
-_ICON = re.compile(r'<i class="fa fa-([^"]*)"></i>')
 
 
 def embed_buttons(html):
@@ -131,15 +125,12 @@ def embed_buttons(html):
     >>> embed_buttons('<i class="fa fa-play"></i>')[:40]
     '<svg viewBox="0 0 14 12" width="14" heig'
     """
-    return _ICON.sub(_icon_as_svg, _FONT_LINK.sub("", html))
-
-
-def _icon_as_svg(icon):
-    path = _ICON_PATHS.get(icon[1])
-    if path is None:
-        return icon[0]
-    # The style repeats the size: style sheets of notebooks stretch pictures.
-    return (
-        '<svg viewBox="0 0 14 12" width="14" height="12" style="width: 14px; height: 12px" '
-        f'aria-hidden="true"><path fill="currentColor" d="{path}"/></svg>'
-    )
+    html = _FONT_LINK.sub("", html)
+    for name, path in _ICON_PATHS.items():
+        # The style repeats the size: style sheets of notebooks stretch pictures.
+        picture = (
+            '<svg viewBox="0 0 14 12" width="14" height="12" style="width: 14px; height: 12px" '
+            f'aria-hidden="true"><path fill="currentColor" d="{path}"/></svg>'
+        )
+        html = html.replace(f'<i class="fa fa-{name}"></i>', picture)
+    return html

@@ -94,7 +94,7 @@ def names_of_trials(names, trials):
     return as_names(names, len(trials), "names", "trials")
 
 
-def labels_of_signals(names, known_units, ylabel=None, units=None):
+def labels_of_signals(names, known_units, units=None):
     """Labels of signals with their units, which are below if both are long.
 
     Parameters
@@ -102,28 +102,24 @@ def labels_of_signals(names, known_units, ylabel=None, units=None):
     names : list of str
     known_units : dict of str to str
         The units of these and other signals; empty where one is not known.
-    ylabel, units : str, list of str, dict of str to str, or None
-        In place of the names and the known units: of all signals, one each, or by name.
+    units : str, list of str, dict of str to str, or None
+        In place of the known units: of all signals, one each, or by name.
     """
-    labels = _by_name(ylabel, names, dict(zip(names, names, strict=True)), "ylabel")
     known_units, out = dict.fromkeys(names, "") | known_units, []
-    for label, unit in zip(labels, _by_name(units, names, known_units, "units"), strict=True):
-        space = " " if len(label) + len(unit) < _LONG else "\n"
-        out.append(f"{label}{space}({unit})" if unit else label)
+    if isinstance(units, str):
+        units = dict.fromkeys(names, units)
+    elif units is not None and not isinstance(units, Mapping):
+        units = dict(zip(names, as_names(units, len(names), "units", "signals"), strict=True))
+    for name in units or ():
+        if name not in known_units:
+            signals = ", ".join(map(str, known_units))
+            raise ValueError(f"units: there is no signal {name!r}; there are {signals}.")
+    known_units |= units or {}
+    for name in names:
+        unit = str(known_units[name])
+        space = " " if len(name) + len(unit) < _LONG else "\n"
+        out.append(f"{name}{space}({unit})" if unit else name)
     return out
-
-
-def _by_name(texts, names, default, what):
-    if isinstance(texts, str):
-        return [texts] * len(names)
-    if texts is not None and not isinstance(texts, Mapping):
-        return as_names(texts, len(names), what, "signals")
-    texts = texts or {}
-    for name in texts:
-        if name not in default:
-            signals = ", ".join(map(str, default))
-            raise ValueError(f"{what}: there is no signal {name!r}; there are {signals}.")
-    return [str(texts.get(name, default[name])) for name in names]
 
 
 def times_from_zero(times, n_frames, frame_rate):

@@ -76,8 +76,9 @@ def empty_lists(n: int) -> list[list]:
 class Display:
     """The base of all displays: a figure with panels, which may be drawn any number of times.
 
-    A display is computed before it is drawn. It tells the layout of its panels (`_layout`), and
-    draws on them (`_draw`).
+    A display is computed before it is drawn: what is drawn are attributes, which its class names
+    and ``from_estimator`` sets. It tells the layout of its panels (`_layout`), and draws on them
+    (`_draw`).
 
     Attributes
     ----------
@@ -104,11 +105,35 @@ class Display:
         Display
             The display itself.
         """
-        cells, shape, size = self._layout()
-        before = getattr(self, "axes_", ())
-        self.figure_, self.axes_ = panels(ax, cells, shape, size, before)
+        self.figure_, self.axes_ = self._panels(ax)
         self._draw()
         return self
+
+    def _panels(self, ax):
+        """The figure and its axes: those of the user, or new ones in cells of a grid."""
+        plt = pyplot()
+        cells, shape, size = self._layout()
+        if ax is None:
+            figure = plt.figure(figsize=size, layout="constrained")
+            grid = figure.add_gridspec(*shape)
+            return figure, [figure.add_subplot(grid[cell]) for cell in cells]
+        axes = list(np.ravel(np.asarray(ax, dtype=object)))
+        if not axes or not all(isinstance(a, plt.Axes) for a in axes):
+            raise ValueError(f"ax must be Axes of matplotlib, got {ax!r:.80}.")
+        figure = axes[0].figure
+        if len(axes) == len(cells):
+            for axis in axes:
+                if axis in getattr(self, "axes_", ()):
+                    axis.clear()
+            return figure, axes
+        if len(axes) != 1 or axes[0].get_subplotspec() is None:
+            raise ValueError(
+                f"ax must be one of a figure's subplots, to be divided, or {len(cells)} axes, one "
+                f"a panel; got {len(axes)}."
+            )
+        axes[0].set_axis_off()
+        grid = axes[0].get_subplotspec().subgridspec(*shape)
+        return figure, [figure.add_subplot(grid[cell]) for cell in cells]
 
     def _layout(self):
         """The cells of the panels, the rows and columns of their grid, and the size in inches."""
@@ -128,52 +153,6 @@ class Display:
                 axis.set_xlabel(xlabel)
 
 
-def panels(ax, cells, shape, size, drawn=()):
-    """A figure and its axes in some cells of a grid.
-
-    Parameters
-    ----------
-    ax : None, Axes, or array-like of Axes
-        None makes a figure. As many axes as cells are used as they are. A single subplot is
-        divided: the panels take its place.
-    cells : list
-        Indices into the grid, one a panel.
-    shape : (int, int)
-        The rows and the columns of the grid.
-    size : (float, float)
-        Width and height of a new figure in inches.
-    drawn : list of Axes, default=()
-        Axes that the display has drawn before; they are cleared.
-
-    Returns
-    -------
-    figure : Figure or SubFigure
-    axes : list of Axes
-    """
-    plt = pyplot()
-    if ax is None:
-        figure = plt.figure(figsize=size, layout="constrained")
-        grid = figure.add_gridspec(*shape)
-        return figure, [figure.add_subplot(grid[cell]) for cell in cells]
-    axes = list(np.ravel(np.asarray(ax, dtype=object)))
-    if not axes or not all(isinstance(a, plt.Axes) for a in axes):
-        raise ValueError(f"ax must be Axes of matplotlib, got {ax!r:.80}.")
-    figure = axes[0].figure
-    if len(axes) == len(cells):
-        for axis in axes:
-            if axis in drawn:
-                axis.clear()
-        return figure, axes
-    if len(axes) != 1 or axes[0].get_subplotspec() is None:
-        raise ValueError(
-            f"ax must be one of a figure's subplots, to be divided, or {len(cells)} axes, one a "
-            f"panel; got {len(axes)}."
-        )
-    axes[0].set_axis_off()
-    grid = axes[0].get_subplotspec().subgridspec(*shape)
-    return figure, [figure.add_subplot(grid[cell]) for cell in cells]
-
-
 def signal_layout(count, more=0.0):
     """Panels of signals, two in a row if there are three or more, above a wide one of their timing.
 
@@ -187,7 +166,7 @@ def signal_layout(count, more=0.0):
     Returns
     -------
     cells, shape, size
-        As `panels` takes them.
+        As `Display._layout` tells them.
     """
     n_cols = 1 if count < 3 else 2
     n_rows = -(-count // n_cols)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -28,34 +27,20 @@ from .arguments import labels_of_signals
 from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, legend_above
 
 
-@dataclass(eq=False, repr=False)
 class CycleDisplay(Display):
     """The self-correlation of a take, where it repeats, and the cuts between its cycles.
 
     Above the self-correlation of the longest stretch over the lag: its peaks, the period, and the
     threshold. Below a curve of the take, its stretches shaded, and its cuts. Use `from_estimator`.
 
-    Parameters
+    Attributes
     ----------
     repeats : SelfCorrelation
         The self-correlation, its peaks, and the period of the longest stretch.
-    curve : ndarray, shape (n_frames,)
-        A curve of the take.
-    axis : TimeAxis
-        The time of the take.
     cuts : ndarray of int
         The frames at which cycles begin and end.
     stretches : list of (int, int)
         The first frames of stretches that repeat, and the frames after their last ones.
-    threshold : float
-        The self-correlation that a cyclic take needs.
-    label : str
-        The label of the curve.
-    title : str
-        What was found.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         The panels of the self-correlation and of the take.
     correlation_, curve_, peaks_, threshold_ : Line2D
@@ -79,12 +64,12 @@ class CycleDisplay(Display):
     """
 
     repeats: SelfCorrelation
-    curve: np.ndarray
+    curve: np.ndarray  # of the take, (n_frames,)
+    label: str  # of the curve
     axis: TimeAxis
     cuts: np.ndarray
     stretches: Sequence[tuple[int, int]]
-    threshold: float
-    label: str
+    threshold: float  # the self-correlation that a cyclic take needs
     title: str
 
     def __repr__(self):
@@ -98,9 +83,7 @@ class CycleDisplay(Display):
         *,
         unit: Unit = "frames",
         frame_rate: float | None = None,
-        ylabel: str | Mapping[str, str] | None = None,
         units: str | Mapping[str, str] | None = None,
-        xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw the self-correlation and the cuts of a take.
@@ -117,11 +100,8 @@ class CycleDisplay(Display):
             The unit of time; ``"percent"`` is of the take.
         frame_rate : float, default=None
             Frames a second, for seconds; by default what tables tell, as in `Match.to_frame`.
-        ylabel, units : str or dict, default=None
-            The label of the curve and its unit; by default its name, and what tables tell in
-            ``attrs["units"]``.
-        xlabel : str, default=None
-            The label of the time of the take, in place of that of the unit.
+        units : str or dict, default=None
+            The unit of the curve; by default what tables tell in ``attrs["units"]``.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -144,29 +124,28 @@ class CycleDisplay(Display):
         longest = (as_learnt(estimator, x, repeats) if fitted else repeats).correlation
         row = segmenter.report(recordings[:1]).iloc[0]
         segmenter.set_params(start=estimator.start_ if fitted else estimator.start)
-        name, curve = _curve_of(segmenter, recordings[0], x)
-        cuts, cycles = np.array([], dtype=int), ""
+        display = cls()
+        name, display.curve = _curve_of(segmenter, recordings[0], x)
+        display.cuts, cycles = np.array([], dtype=int), ""
         if fitted and row["cyclic"]:
             _, origin = estimator.segment(recordings[:1])
             whole = origin[origin["complete"]]
-            cuts = np.unique([whole["start"], whole["stop"] - 1])
+            display.cuts = np.unique([whole["start"], whole["stop"] - 1])
             cycles = counted(len(whole), "whole cycle")
         facts = TrialFacts.of([recordings[0]], frame_rate)
         lasting = facts.durations() if unit == "seconds" else None
-        (label,) = labels_of_signals([name], units_of_columns(recordings[0]), ylabel, units)
+        n_frames = len(display.curve)
+        display.axis = TimeAxis(unit, n_frames, [n_frames], lasting)
+        (display.label,) = labels_of_signals([name], units_of_columns(recordings[0]), units)
         period = f"period {longest.period:.1f} frames" if row["period"] > 0 else ""
         several = f"{len(row['stretches'])} stretches" if len(row["stretches"]) > 1 else ""
         found = filter(None, [row["reason"], several, period, cycles])
-        return cls(
-            longest if row["period"] > 0 else longest._replace(period=np.nan),
-            curve,
-            TimeAxis(unit, len(curve), [len(curve)], lasting, xlabel),
-            cuts,
-            row["stretches"],
-            float(required_strength(np.inf, longest.breadth, segmenter.threshold)),
-            label,
-            ", ".join(found) or "no period",
-        ).plot(ax)
+        display.title = ", ".join(found) or "no period"
+        display.repeats = longest if row["period"] > 0 else longest._replace(period=np.nan)
+        display.stretches = row["stretches"]
+        threshold = required_strength(np.inf, longest.breadth, segmenter.threshold)
+        display.threshold = float(threshold)
+        return display.plot(ax)
 
     def _layout(self):
         return [0, 1], (2, 1), (WIDTH, 4.8)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -16,14 +15,12 @@ from ..gait.recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
 from ..inputs.types import Table, TrialsLike, ValuesLike
 from ..inputs.wording import counted
 from .arguments import as_index
-from .base import WIDTH, AxesLike, Display, legend_above
+from .base import COLORS, WIDTH, AxesLike, Display, legend_above
 
-# Colours of the feet, and of strikes and foot-offs.
-_COLORS = {"left": "#D55E00", "right": "#0072B2"}
+# Line styles of strikes and foot-offs.
 _STYLES = {FOOT_STRIKE: "-", FOOT_OFF: ":"}
 
 
-@dataclass(eq=False, repr=False)
 class GaitDisplay(Display):
     """Heights of heels and toes of a recording, its foot strikes and foot-offs, and the stances.
 
@@ -31,21 +28,12 @@ class GaitDisplay(Display):
     a bar for each stance: where two bars overlap, both feet are on the ground. Use
     `from_positions`.
 
-    Parameters
+    Attributes
     ----------
-    times : ndarray, shape (n_frames,)
-        Seconds.
-    heights : mapping of str to ndarray (n_frames,)
+    heights : dict of str to ndarray (n_frames,)
         Of ``left_heel``, ``left_toe``, ``right_heel`` and ``right_toe``, as far as they are known.
     events : DataFrame
         ``label``, ``context`` and ``time`` of the events, as from `gait_events`.
-    unit : str, default=""
-        Of the heights.
-    xlabel : str, default=None
-        The label of the time axis.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         A panel for each foot, and that of the stances.
     stances_ : dict of str to list of (float, float)
@@ -60,11 +48,10 @@ class GaitDisplay(Display):
     GaitDisplay(8 strikes, 8 foot-offs)
     """
 
-    times: np.ndarray
-    heights: Mapping[str, np.ndarray]
+    times: np.ndarray  # of the frames, in seconds
+    heights: dict[str, np.ndarray]
     events: pd.DataFrame
-    unit: str = ""
-    xlabel: str | None = None
+    unit: str  # of the heights
 
     def __repr__(self):
         counts = [int((self.events["label"] == label).sum()) for label in (FOOT_STRIKE, FOOT_OFF)]
@@ -80,7 +67,6 @@ class GaitDisplay(Display):
         recording: int = 0,
         feet: Mapping[str, str | Sequence[str] | None] | None = None,
         frame_rate: float | ValuesLike | None = None,
-        xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw the feet and the events of a recording.
@@ -99,8 +85,6 @@ class GaitDisplay(Display):
             As for `gait_events`.
         frame_rate : float, or array-like of shape (n_recordings,), default=None
             Frames a second; by default what tables tell.
-        xlabel : str, default=None
-            The label of the time axis, in place of "time (s)".
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -119,7 +103,8 @@ class GaitDisplay(Display):
         walk = recordings.walk(i)
         events_of_walk = events_of(walk, recordings.split_events(events)[i])
         rows = np.arange(0, walk.n_samples, walk.per_frame)
-        scale, unit = recordings.length_of_leg(i, walk)
+        display = cls()
+        scale, display.unit = recordings.length_of_leg(i, walk)
         ends = {"heel": walk.heels, "toe": walk.toes}
         heights = {
             f"{side}_{end}": scale * of_sides[side][rows, 1]
@@ -128,10 +113,10 @@ class GaitDisplay(Display):
             if side in of_sides
         }
         floor = min(np.nanmin(values) for values in heights.values())
-        heights = {name: values - floor for name, values in heights.items()}
-        times = recordings.times_at(i, np.arange(len(rows)))
-        table = tabulate_events(recordings, i, walk, events_of_walk)
-        return cls(times, heights, table, unit, xlabel).plot(ax)
+        display.heights = {name: values - floor for name, values in heights.items()}
+        display.times = recordings.times_at(i, np.arange(len(rows)))
+        display.events = tabulate_events(recordings, i, walk, events_of_walk)
+        return display.plot(ax)
 
     def _layout(self):
         count = len(self._sides()) + 1
@@ -147,19 +132,19 @@ class GaitDisplay(Display):
             for end, style in (("heel", "-"), ("toe", "--")):
                 if f"{side}_{end}" in self.heights:
                     height = self.heights[f"{side}_{end}"]
-                    axis.plot(self.times, height, style, color=_COLORS[side])
+                    axis.plot(self.times, height, style, color=COLORS[side])
             for label, style in _STYLES.items():
                 for time in self._times_of(side, label):
                     axis.axvline(time, color="black", linestyle=style, linewidth=0.9)
             axis.set_title(f"{side} foot", fontsize="medium")
         for k, side in enumerate(reversed(sides)):
-            bars.broken_barh(self.stances_[side], (k - 0.35, 0.7), facecolors=_COLORS[side])
+            bars.broken_barh(self.stances_[side], (k - 0.35, 0.7), facecolors=COLORS[side])
         bars.set_yticks(range(len(sides)), list(reversed(sides)))
         bars.set_ylim(-0.6, len(sides) - 0.4)
         bars.set_title("on the ground", fontsize="medium")
         height = f"height ({self.unit})" if self.unit else "height"
         names = [*[height] * len(sides), "foot"]
-        self._label_axes(self.axes_, names, self.xlabel or "time (s)", ends=self.times)
+        self._label_axes(self.axes_, names, "time (s)", ends=self.times)
         shown = [("heel", "-")] + [("toe", "--")] * any(n.endswith("toe") for n in self.heights)
         handles = [Line2D([], [], color="gray", linestyle=s, label=name) for name, s in shown]
         handles += [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -57,9 +56,11 @@ class GroupCurves(NamedTuple):
 
     Attributes
     ----------
-    mean, lower, upper : ndarray, shape (P, n_panels)
-        The bounds are NaN without a band.
-    trials : ndarray (n, P, n_panels), or None
+    mean, half : ndarray, shape (P, n_panels)
+        The mean, and half the width of the band, NaN without one.
+    offsets : ndarray, shape (n_people, P)
+        Of its people, from the mean of all trials, in the unit of time.
+    trials : ndarray (n, P, n_signals), or None
     label : str
         The entry of the legend.
     color, line : str
@@ -67,35 +68,21 @@ class GroupCurves(NamedTuple):
     """
 
     mean: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+    half: np.ndarray
+    offsets: np.ndarray
     trials: np.ndarray | None
     label: str
     color: str
     line: str
 
-    def draw_trials(self, axis, clock, i):
-        """Draw the trials in panel i."""
-        behind = self.trials[:, :, i]
-        return curves(
-            axis, [clock] * len(behind), behind, colors=self.color, linewidths=0.7, alpha=0.5
-        )
-
     def draw_band(self, axis, clock, i):
         """Draw the band of panel i in the pale colour of the group."""
-        bounds = self.lower[:, i], self.upper[:, i]
+        bounds = self.mean[:, i] - self.half[:, i], self.mean[:, i] + self.half[:, i]
         for bound in bounds:
             axis.plot(clock, bound, color=self.color, linewidth=0.5)
         return axis.fill_between(clock, *bounds, color=self.color, alpha=0.18, linewidth=0)
 
-    def draw_mean(self, axis, clock, i):
-        """Draw the mean in panel i."""
-        return front_line(
-            axis, clock, self.mean[:, i], color=self.color, linewidth=2, linestyle=self.line
-        )
 
-
-@dataclass(eq=False, repr=False)
 class GroupDisplay(Display):
     """Means of groups with bands, the timing of their people, and where they differ.
 
@@ -103,30 +90,13 @@ class GroupDisplay(Display):
     the mean offset of all trials, so a group at 0 is as early and as late as all of them together.
     Use `from_estimator`.
 
-    Parameters
+    Attributes
     ----------
     groups : list of GroupCurves
         For each group the mean and the band of its people, of the signals and of their offsets at
         last; and its trials, if they are drawn.
-    offsets : list of ndarray, shape (n_people_k, P)
-        For each group the offsets of its people from the mean of all trials, in the unit of time.
-    axis : TimeAxis
-        The clock of the pattern.
-    ylabels : list of str
-        Labels of the signals.
-    feature_names : list of str
-        Names of the signals, as in the table of clusters.
-    title : str
-        The meaning of the bands, for the legend.
     events : DataFrame (n_people, n_events), or None
         Where the events of people are on the clock, in frames: lines and their spread.
-    comparison : GroupComparison or None
-        In the same unit: its clusters are bars.
-    pairs : bool
-        Whether people of all groups are the same, in the same order: their dots are joined.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         One a signal, then that of the offsets.
     means_ : list of list of Line2D
@@ -159,14 +129,13 @@ class GroupDisplay(Display):
     """
 
     groups: Sequence[GroupCurves]
-    offsets: Sequence[np.ndarray]
     axis: TimeAxis
     ylabels: Sequence[str]
-    feature_names: Sequence[str]
-    title: str
+    feature_names: Sequence[str]  # as in the table of clusters
+    title: str  # the meaning of the bands
     events: pd.DataFrame | None
     comparison: GroupComparison | None
-    pairs: bool
+    pairs: bool  # whether people of all groups are the same, whose dots are joined
 
     def __repr__(self):
         return f"GroupDisplay({[group.label for group in self.groups]}, {self.feature_names})"
@@ -185,7 +154,6 @@ class GroupDisplay(Display):
         trials: bool = False,
         comparison: GroupComparison | None = None,
         events: NumbersLike | pd.DataFrame | None = None,
-        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         unit: Unit = "percent",
         xlabel: str | None = None,
@@ -225,9 +193,9 @@ class GroupDisplay(Display):
             of people. The columns of a table are their names. By default ``keyframes``. The panel
             of offsets has its dots there; without events, where timing differs most: at the peak of
             a cluster, or where offsets of people vary most.
-        ylabel, units : str, list of str or dict, default=None
-            Labels of the signals and their units: of all, one each, or by name. By default their
-            names, and what tables tell in ``attrs["units"]``.
+        units : str, list of str or dict, default=None
+            The units of the signals: of all, one each, or by name. By default what tables tell in
+            ``attrs["units"]``.
         unit : {"frames", "percent", "seconds"}, default="percent"
             Unit of time, as in `compare_groups`.
         xlabel : str, default=None
@@ -271,27 +239,26 @@ class GroupDisplay(Display):
             chosen = choose_features(None, names)
             notes.append(f"{len(chosen)} of {len(names)} signals")
         names = [names[i] for i in chosen]
-        if others := _others_that_differ(comparison, names):
-            notes.append(f"differences also in {', '.join(others)}")
-        known_units = dict(zip(aligned.names, aligned.units, strict=True))
-        of_people = GroupsOfPeople.of(y, groups, len(aligned.curves))
-        # From the mean of all trials.
-        offsets = of_people.means(aligned.offsets - aligned.offsets.mean(axis=0))
-        shown = aligned.curves[:, :, chosen]
+        if comparison is not None:
+            differing = comparison.clusters.query("what == 'shape'")["feature"]
+            others = list(dict.fromkeys(differing[~differing.isin(names)]))
+            notes += [f"differences also in {', '.join(others)}"] * bool(others)
         whom = "trials" if groups is None else "people"
         title = _STATISTICS[statistic].format(whom=whom, share=100 * _COVERAGE)
-        of_groups = _curves_of_groups(of_people, shown, offsets, statistic, trials, groups)
-        return cls(
-            of_groups,
-            offsets,
-            TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel),
-            labels_of_signals(names, known_units, ylabel, units),
-            names,
-            "; ".join(filter(None, [title, ", ".join(notes)])),
-            _events_on_clock(events, aligned, of_people),
-            comparison,
-            groups is not None and of_people.are_pairs,
-        ).plot(ax)
+        of_people = GroupsOfPeople.of(y, groups, len(aligned.curves))
+        display = cls()
+        display.groups = _curves_of_groups(
+            of_people, aligned, chosen, statistic, trials, groups is not None
+        )
+        display.axis = TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel)
+        display.feature_names = names
+        known_units = dict(zip(aligned.names, aligned.units, strict=True))
+        display.ylabels = labels_of_signals(names, known_units, units)
+        display.title = "; ".join(filter(None, [title, ", ".join(notes)]))
+        display.events = _events_on_clock(events, aligned, of_people)
+        display.comparison = comparison
+        display.pairs = groups is not None and of_people.are_pairs
+        return display.plot(ax)
 
     def _layout(self):
         more = 0.6 + 0.2 * max(len(self.groups) - 2, 0) + 0.5 * (self.events is not None)
@@ -300,16 +267,19 @@ class GroupDisplay(Display):
     def _draw(self):
         *above, timing = self.axes_
         clock = self.axis.clock
-        self.trials_ = []
-        if self.groups[0].trials is not None:
-            self.trials_ = [
-                [group.draw_trials(axis, clock, i) for group in self.groups]
-                for i, axis in enumerate(above)
-            ]
-        self.bands_, self.means_ = [], []
+        self.trials_, self.bands_, self.means_ = empty_lists(3)
         for i, axis in enumerate(self.axes_):
+            if self.groups[0].trials is not None and axis is not timing:
+                self.trials_.append([])
+                for group in self.groups:
+                    behind, style = group.trials[:, :, i], {"linewidths": 0.7, "alpha": 0.5}
+                    lines = curves(axis, [clock] * len(behind), behind, colors=group.color, **style)
+                    self.trials_[-1].append(lines)
             self.bands_.append([group.draw_band(axis, clock, i) for group in self.groups])
-            self.means_.append([group.draw_mean(axis, clock, i) for group in self.groups])
+            self.means_.append([])
+            for group in self.groups:
+                style = {"color": group.color, "linestyle": group.line, "linewidth": 2}
+                self.means_[-1].append(front_line(axis, clock, group.mean[:, i], **style))
         timing.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         ylabels = [*self.ylabels, offset_label(self.axis.unit)]
         self._label_axes(self.axes_, ylabels, self.axis.label, ends=clock)
@@ -342,10 +312,11 @@ class GroupDisplay(Display):
         width, at = self.axis.clock[-1], self._moments()
         low, high = np.floor(at).astype(int), np.ceil(at).astype(int)
         xs, ys = [], []
-        for k, offsets in enumerate(self.offsets):
-            beside = (k - (len(self.offsets) - 1) / 2) * _BESIDE * width
+        for k, group in enumerate(self.groups):
+            beside = (k - (len(self.groups) - 1) / 2) * _BESIDE * width
             x = np.clip(self.axis.convert(at) + beside, 0, width)
-            y = offsets[:, low] + (at - low) * (offsets[:, high] - offsets[:, low])
+            before, after = group.offsets[:, low], group.offsets[:, high]
+            y = before + (at - low) * (after - before)
             xs.append(np.broadcast_to(x, y.shape))
             ys.append(y)
         if self.pairs:
@@ -372,7 +343,8 @@ class GroupDisplay(Display):
         if self.comparison is not None and len(timing := self._clusters_of("timing")):
             clock = self.axis.clock
             return timing["peak"].to_numpy() * (len(clock) - 1) / clock[-1]
-        return np.array([first_largest(np.concatenate(self.offsets).var(axis=0))], dtype=float)
+        offsets = np.concatenate([group.offsets for group in self.groups])
+        return np.array([first_largest(offsets.var(axis=0))], dtype=float)
 
     def _clusters_of(self, what, feature=None):
         """The clusters of the timing, or of a signal."""
@@ -399,29 +371,22 @@ class GroupDisplay(Display):
         return [lines for lines in self.clusters_ if len(lines.get_segments())]
 
 
-def _others_that_differ(comparison, names):
-    """The signals of clusters in shape that are not among these; of no comparison none."""
-    if comparison is None:
-        return []
-    features = comparison.clusters.query("what == 'shape'")["feature"]
-    return list(dict.fromkeys(features[~features.isin(names)]))
-
-
-def _curves_of_groups(of_people, shown, offsets, statistic, trials, groups):
+def _curves_of_groups(of_people, aligned, chosen, statistic, trials, named):
     """The curves of each group in the panels of the signals and of the offsets."""
+    # Offsets are counted from the mean of all trials.
+    offsets = (aligned.offsets - aligned.offsets.mean(axis=0))[:, :, np.newaxis]
+    signals = aligned.curves[:, :, chosen]
     of_groups = []
-    for label, (color, line), maker, curves_of_people, offsets_of_people in zip(
-        of_people.describe(groups is not None),
+    for label, (color, line), maker, panels in zip(
+        of_people.describe(named),
         group_styles(of_people.labels).values(),
         of_people.makers,
-        of_people.means(shown),
-        offsets,
+        of_people.means(np.concatenate([signals, offsets], axis=2)),
         strict=True,
     ):
-        panels = np.concatenate([curves_of_people, offsets_of_people[:, :, np.newaxis]], axis=2)
         mean, half = band_of_mean(panels, statistic, _COVERAGE)
-        drawn = shown[maker.any(axis=0)] if trials else None
-        of_groups.append(GroupCurves(mean, mean - half, mean + half, drawn, label, color, line))
+        behind = signals[maker.any(axis=0)] if trials else None
+        of_groups.append(GroupCurves(mean, half, panels[:, :, -1], behind, label, color, line))
     return of_groups
 
 
@@ -444,25 +409,11 @@ def _events_on_clock(events, aligned, of_people):
     return pd.DataFrame(np.concatenate(of_people.means(places)), columns=shares.columns)
 
 
-@dataclass(eq=False, repr=False)
 class NormDisplay(Display):
     """A subject before a norm: a panel for each signal, and one of the offset.
 
     The subject is the strongest line, violet where it departs. The offset is counted from the mean
     offset of the norm, which is flat. Use `from_comparison`.
-
-    Parameters
-    ----------
-    comparison : NormComparison
-        From `compare_to_norm`.
-    subject : label
-        One of ``comparison.verdicts.index``.
-    signals : list of int
-        The signals that are drawn, by index.
-    labels : list of str
-        Their labels.
-    xlabel : str, default=None
-        The label of the time axis.
 
     Attributes
     ----------
@@ -493,9 +444,9 @@ class NormDisplay(Display):
 
     comparison: NormComparison
     subject: Hashable
-    signals: Sequence[int]
-    labels: Sequence[str]
-    xlabel: str | None = None
+    signals: Sequence[int]  # those that are drawn, by index
+    labels: Sequence[str]  # of these
+    axis: TimeAxis
 
     def __repr__(self):
         return f"NormDisplay({self.comparison.describe(self.subject)!r})"
@@ -507,7 +458,6 @@ class NormDisplay(Display):
         subject: Hashable,
         *,
         features: Features | None = None,
-        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         xlabel: str | None = None,
         ax: AxesLike | None = None,
@@ -523,9 +473,9 @@ class NormDisplay(Display):
         features : int, str or list of them, default=None
             Signals that are drawn, by index or name. By default those with a departure and the
             first ones, four in all. The offset is always drawn.
-        ylabel, units : str, list of str or dict, default=None
-            Labels of the signals and their units: of all, one each, or by name. By default their
-            names, and what tables tell in ``attrs["units"]``.
+        units : str, list of str or dict, default=None
+            The units of the signals: of all, one each, or by name. By default what tables tell in
+            ``attrs["units"]``.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None
@@ -561,8 +511,11 @@ class NormDisplay(Display):
             chosen = choose_features(features, signals)
         names = [signals[k] for k in chosen]
         known_units = dict(zip(comparison.features, comparison.units, strict=True))
-        labels = labels_of_signals(names, known_units, ylabel, units)
-        return cls(comparison, subject, chosen, labels, xlabel).plot(ax)
+        display = cls()
+        display.comparison, display.subject, display.signals = comparison, subject, chosen
+        display.labels = labels_of_signals(names, known_units, units)
+        display.axis = TimeAxis.of_clock(comparison.unit, comparison.clock, xlabel)
+        return display.plot(ax)
 
     def _layout(self):
         return signal_layout(len(self.signals), 1.0)
@@ -570,7 +523,6 @@ class NormDisplay(Display):
     def _draw(self):
         norm = self.comparison
         subject = norm.verdicts.index.get_loc(self.subject)
-        axis_of_time = TimeAxis.of_clock(norm.unit, norm.clock, self.xlabel)
         self.subject_, self.mean_, self.bands_, self.spread_, self.departures_ = empty_lists(5)
         clock, grey, violet = norm.clock, COLORS["envelope"], COLORS["departure"]
         for axis, k in zip(self.axes_, [*self.signals, -1], strict=True):
@@ -588,11 +540,10 @@ class NormDisplay(Display):
             line = front_line(axis, clock, curve, color=COLORS["trial"], linewidth=2.4)
             self.subject_.append(line)
             xs, ys = parts_outside(curve[np.newaxis], mean - reach, mean + reach)
-            xs = axis_of_time.convert(xs)
-            lines = curves(axis, xs, ys, colors=violet, linewidths=2.8, zorder=5)
+            lines = curves(axis, self.axis.convert(xs), ys, colors=violet, linewidths=2.8, zorder=5)
             self.departures_.append(lines)
         ylabels = [*self.labels, offset_label(norm.unit)]
-        self._label_axes(self.axes_, ylabels, axis_of_time.label, ends=clock)
+        self._label_axes(self.axes_, ylabels, self.axis.label, ends=clock)
         handles = [self.subject_[0], (self.spread_[0], self.mean_[0]), self.bands_[0]]
         n_trials = int(norm.verdicts["n_trials"].iloc[subject])
         labels = [

@@ -12,7 +12,17 @@ from ..inputs.types import Labels, TrialsLike, Unit
 from ..inputs.wording import counted
 from ..synchronizers.parts import Lags, PartSynchronizer
 from ..utils.pipelines import route_to_synchronizer
-from .base import COLORS, WIDTH, AxesLike, Display, TimeAxis, curves, front_line, legend_above
+from .base import (
+    COLORS,
+    WIDTH,
+    AxesLike,
+    Display,
+    TimeAxis,
+    curves,
+    empty_lists,
+    front_line,
+    legend_above,
+)
 
 _UNITS = {"frames": "frames", "percent": "% of the time", "seconds": "s"}
 # The largest number of curves in a row.
@@ -21,12 +31,11 @@ _CURVES_A_ROW = 3
 
 @dataclass(eq=False, repr=False)
 class LagDisplay(Display):
-    """A map of lags, part by time, above the curves of the parts with their spread.
+    """The lag of each part over time: its mean, and how much it varies.
 
-    The map shows the mean lag. It is hatched where the 95 % confidence interval of the mean
-    contains 0. The curves show the mean and the interval; broken lines are one standard deviation
-    of trials from the mean. Use `from_estimator`, or ``LagDisplay(lags).plot()`` with lags that are
-    known already.
+    The grey band is the 95 % confidence interval of the mean: where it contains 0, the lag cannot
+    be told from none. Broken lines are one standard deviation of trials from the mean. Use
+    `from_estimator`, or ``LagDisplay(lags).plot()`` with lags that are known already.
 
     Parameters
     ----------
@@ -38,19 +47,13 @@ class LagDisplay(Display):
     Attributes
     ----------
     axes_ : list of Axes
-        The panel of the map, then those of the curves, one a part.
-    map_ : QuadMesh
-        The mean lags.
-    unsure_ : list of PolyCollection
-        The hatched stretches of each part.
+        The panels, one a part.
     means_ : list of Line2D
         The mean of each part.
     intervals_ : list of FillBetweenPolyCollection
         The confidence interval of each part.
     spreads_ : list of LineCollection
         The standard deviation of each part.
-    colorbar_ : Colorbar
-        The scale of the map.
 
     Examples
     --------
@@ -68,7 +71,9 @@ class LagDisplay(Display):
     xlabel: str | None = None
 
     def __repr__(self):
-        return f"LagDisplay({self._describe()})"
+        n_parts = self.lags.values.shape[1]
+        lagging = f"{n_parts} parts" if n_parts > 1 else self.lags.parts[0]
+        return f"LagDisplay({lagging} behind the rest of the body, {self._count()})"
 
     @classmethod
     def from_estimator(
@@ -119,103 +124,48 @@ class LagDisplay(Display):
     def _layout(self):
         n_parts = self.lags.values.shape[1]
         n_cols = min(n_parts, _CURVES_A_ROW)
-        n_rows = 2 - (-n_parts // n_cols)
-        # The map is as high as two rows of curves.
-        curves_at = ((2 + i // n_cols, i % n_cols) for i in range(n_parts))
-        cells = [(slice(0, 2), slice(None)), *curves_at]
-        return cells, (n_rows, n_cols), (WIDTH, 0.6 + 1.6 * n_rows)
+        n_rows = -(-n_parts // n_cols)
+        cells = [divmod(i, n_cols) for i in range(n_parts)]
+        return cells, (n_rows, n_cols), (WIDTH, 1 + 1.9 * n_rows)
 
     def _draw(self):
         n_parts, n_frames = self.lags.values.shape[1:]
         unit = "frames" if self.lags.unit == "frames" else "percent"
-        axis, table = TimeAxis(unit, n_frames, label=self.xlabel), self.lags.over_time()
-        columns = {
-            name: table[name].to_numpy().reshape(n_parts, n_frames)
-            for name in ("mean", "sd", "low", "high")
-        }
-        top, *below = self.axes_
-        self._draw_map(top, axis, columns)
-        self._draw_curves(below, axis, columns)
-
-    def _draw_map(self, top, axis, columns):
-        mean = columns["mean"]
-        largest = np.abs(mean).max() or 1.0
-        self.map_ = top.pcolormesh(
-            axis.clock,
-            np.arange(len(mean)),
-            mean,
-            cmap="RdBu_r",
-            vmin=-largest,
-            vmax=largest,
-            shading="nearest",
-            rasterized=True,
+        time, table = TimeAxis(unit, n_frames, label=self.xlabel), self.lags.over_time()
+        self.means_, self.intervals_, self.spreads_ = empty_lists(3)
+        reach = 1.05 * max((table["mean"].abs() + table["sd"].fillna(0)).max(), 1e-9)
+        black, grey, orange = (COLORS[name] for name in ("pattern", "envelope", "mean"))
+        for i, (axis, part) in enumerate(zip(self.axes_, self.lags.parts, strict=True)):
+            mean, sd, low, high = table.loc[part, ["mean", "sd", "low", "high"]].to_numpy().T
+            axis.axhline(0, color="0.3", linewidth=0.8)
+            band = axis.fill_between(time.clock, low, high, color=grey, alpha=0.6, linewidth=0)
+            self.intervals_.append(band)
+            style = {"colors": black, "linewidths": 0.9, "linestyles": "--"}
+            ends = mean - np.nan_to_num(sd), mean + np.nan_to_num(sd)
+            self.spreads_.append(curves(axis, [time.clock] * 2, ends, **style))
+            self.means_.append(front_line(axis, time.clock, mean, color=orange))
+            axis.set_ylim(-reach, reach)
+            axis.tick_params(labelleft=i % _CURVES_A_ROW == 0)
+        of_row = [f"late by\n({_UNITS[self.lags.unit]})", "", ""]
+        ylabels = [of_row[i % _CURVES_A_ROW] for i in range(n_parts)]
+        self._label_axes(
+            self.axes_, ylabels, time.label, ends=time.clock, n_cols=min(n_parts, _CURVES_A_ROW)
         )
-        # NaN bounds, of a single trial, are unsure as well.
-        unsure = ~((columns["low"] > 0) | (columns["high"] < 0))
-        self.unsure_ = [
-            top.fill_between(
-                axis.clock,
-                i - 0.5,
-                i + 0.5,
-                where=where,
-                step="mid",
-                facecolor="none",
-                edgecolor="0.35",
-                hatch="////",
-                linewidth=0,
-            )
-            for i, where in enumerate(unsure)
-        ]
-        names = list(self.lags.parts)
+        titles = dict(zip(self.lags.parts, self.lags.parts, strict=True))
         if self.lags.groups is not None:
             # With their repeatability where it is known.
-            icc = self.lags.summary()["icc"]
-            names = [f"{name}\nICC {x:.2f}" if x == x else name for name, x in icc.items()]
-        top.set_yticks(range(len(mean)), names, fontsize="small")
-        top.set_ylim(len(mean) - 0.5, -0.5)
-        top.set_xlim(axis.clock[0], axis.clock[-1])
-        top.set_xlabel(axis.label)
-        top.set_title(self._describe(), fontsize="small")
-        top.grid(False)
-        self.colorbar_ = self.figure_.colorbar(
-            self.map_, ax=top, location="top", aspect=40, pad=0.02
-        )
-        self.colorbar_.set_label(f"mean lag ({_UNITS[self.lags.unit]})", fontsize="small")
-
-    def _draw_curves(self, panels, axis, columns):
-        self.means_, self.intervals_, self.spreads_ = [], [], []
-        mean, sd = columns["mean"], np.nan_to_num(columns["sd"])
-        reach = 1.05 * max((np.abs(mean) + sd).max(), 1e-9)
-        for i, ax in enumerate(panels):
-            ax.axhline(0, color="0.3", linewidth=0.8)
-            low, high, grey = columns["low"][i], columns["high"][i], COLORS["envelope"]
-            interval = ax.fill_between(axis.clock, low, high, color=grey, alpha=0.6, linewidth=0)
-            self.intervals_.append(interval)
-            ends, black = (mean[i] - sd[i], mean[i] + sd[i]), COLORS["pattern"]
-            spread = curves(
-                ax, [axis.clock] * 2, ends, colors=black, linewidths=0.9, linestyles="--"
-            )
-            self.spreads_.append(spread)
-            self.means_.append(front_line(ax, axis.clock, mean[i], color=COLORS["mean"]))
-            ax.set_title(self.lags.parts[i], fontsize="small")
-            ax.set_xlim(axis.clock[0], axis.clock[-1])
-            ax.set_ylim(-reach, reach)
-            if i + _CURVES_A_ROW >= len(mean):
-                ax.set_xlabel(axis.label, fontsize="small")
-            if i % _CURVES_A_ROW:
-                ax.tick_params(labelleft=False)
-            else:
-                ax.set_ylabel(f"late by\n({_UNITS[self.lags.unit]})", fontsize="small")
+            icc = self.lags.summary()["icc"].dropna()
+            titles |= {part: f"{part}, ICC {share:.2f}" for part, share in icc.items()}
+        for axis, title in zip(self.axes_, titles.values(), strict=True):
+            axis.set_title(title, fontsize="small")
         units = "trials" if self.lags.groups is None else "people"
         handles = [self.means_[0], self.intervals_[0], self.spreads_[0]]
-        legend_above(panels, handles, ["mean", f"95 % interval ({units})", "± 1 SD of trials"])
+        labels = [f"mean, {self._count()}", f"95 % interval ({units})", "± 1 SD of trials"]
+        legend_above(self.axes_, handles, labels)
 
-    def _describe(self):
-        n_sequences, n_parts = self.lags.values.shape[:2]
-        lagging = f"{n_parts} parts" if n_parts > 1 else self.lags.parts[0]
+    def _count(self):
         people = ""
         if self.lags.groups is not None:
             n_people = len(np.unique(self.lags.groups))
             people = " of 1 person" if n_people == 1 else f" of {n_people} people"
-        count = counted(n_sequences, "trial")
-        return f"{lagging} behind the rest of the body, {count}{people}"
+        return f"{counted(len(self.lags.values), 'trial')}{people}"

@@ -104,20 +104,17 @@ def _bones_of_limb(limb, skeleton):
     return [ends] if ends in skeleton.bones else [b for b in skeleton.bones if b[1] in ends]
 
 
-def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
-    """What `SkeletonDisplay` draws of the departures of a trial: values of its parameters.
+def set_departures(display, estimator, X, params, caller, *, trial, frames, reference):
+    """Set what a display draws of the departures of a trial.
 
     Parameters
     ----------
+    display : SkeletonDisplay
     estimator : Pipeline
     X, params, caller
         As for `view_of`.
     trial, frames, reference
         As for `SkeletonDisplay.from_departures`.
-
-    Returns
-    -------
-    scenes, skeleton, titles, marked, behind, heading
     """
     if X is None:
         raise ValueError(f"{caller} needs trials X, whose departures are drawn; got None.")
@@ -140,7 +137,9 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
         is_accepted = not judged.refused[i]
     # Hints would hide what is rare, and most right trials have some.
     rows = [row for row in rows if row.rare] or ([] if is_accepted else rows)
-    shown, titles, marked = limb_departures(rows, len(judged.mean), frames, skeleton)
+    shown, display.titles, display.marked = limb_departures(
+        rows, len(judged.mean), frames, skeleton
+    )
     bodies, shadows = (
         np.asarray(limbs.cosines.inverse_transform(limbs.invert(x)))
         for x in (judged.curves[i], judged.mean)
@@ -154,13 +153,13 @@ def draw_departures(estimator, X, params, caller, *, trial, frames, reference):
     verdict = "accepted" if is_accepted else "not accepted"
     whose = "a new person" if reference is None else "this person"
     rare = [describe_departure(row) for row in rows if row.rare and row.limb is not None]
-    heading = (
+    display.heading = (
         f"{name_trial(i, view.labels[i])} is {verdict}.\n"
         f"Rare: {', '.join(rare) if rare else 'nothing'}. Violet: limbs that depart at or around "
         f"that frame. Pale: what is expected of {whose}."
     )
-    scenes, behind = ([[x[[frame]]] for frame in shown] for x in (bodies, shadows))
-    return scenes, skeleton, titles, marked, behind, heading
+    display.scenes, display.behind = ([[x[[frame]]] for frame in shown] for x in (bodies, shadows))
+    display.skeleton = skeleton
 
 
 def split_at_synchronizer(estimator):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from textwrap import fill
 from typing import Any, NamedTuple, Self
 
@@ -41,8 +40,6 @@ _ROW = 2.2
 _LINE_LENGTH = 24
 # The interval of the arc of a dial, as a share of the mean duration.
 _AHEAD = 0.1
-# Standard deviations on each side that contain 90 %.
-_BAND = 1.645
 # The opacity of the interval of the phase.
 _INTERVAL_OPACITY = 0.25
 # Cycles on the time axis.
@@ -57,7 +54,6 @@ _AZIMUTH = -60
 _MIN_OPACITY = 0.12
 
 
-@dataclass(eq=False, repr=False)
 class PhaseDisplay(MovingDisplay):
     """Running trials: their phase, its confidence, and a prediction.
 
@@ -67,27 +63,13 @@ class PhaseDisplay(MovingDisplay):
     the phase on, for as long as `OnlineSynchronizer.time_left` estimates. With ``body`` also a
     stick figure, before the mean one at the end of that arc. Use `from_estimator`.
 
-    Parameters
-    ----------
-    action : LearntAction
-        The learnt action, with its clock.
-    trials : list of RunningTrial
-        The trials with their phases.
-    features : list of str
-        The labels of the features.
-    skeleton : Skeleton or None
-        The skeleton of the bodies.
-    xlabel : str
-        The label of time axes.
-
     Attributes
     ----------
     axes_ : list of Axes
         Row by row: a body if there are bodies, the dial, the phase, and one a feature.
     rows_ : list
         The artists of each trial: ``row.dial.passed``, ``row.phase``, ``row.interval``,
-        ``row.confidence``, ``row.afterwards``, ``row.rest``, ``row.curves[k].seen``,
-        ``row.curves[k].expected``.
+        ``row.confidence``, ``row.rest``, ``row.curves[k].seen``, ``row.curves[k].expected``.
 
     Examples
     --------
@@ -106,10 +88,11 @@ class PhaseDisplay(MovingDisplay):
     """
 
     action: LearntAction
-    trials: Sequence[RunningTrial]
-    features: Sequence[str]
-    skeleton: Skeleton | None
+    trials: list[RunningTrial]
+    features: Sequence[str]  # their labels
+    skeleton: Skeleton | None = None  # of the bodies
     xlabel: str
+    time: float  # the moment that is drawn
 
     def __repr__(self):
         return f"PhaseDisplay({counted(len(self.trials), 'trial')})"
@@ -122,12 +105,9 @@ class PhaseDisplay(MovingDisplay):
         *,
         times: Indexed[ValuesLike] | ValuesLike | None = None,
         features: Features | None = None,
-        training: TrialsLike | None = None,
         body: BaseEstimator | None = None,
         names: Sequence[str] | None = None,
-        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
-        xlabel: str | None = None,
         frame: int | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
@@ -143,20 +123,17 @@ class PhaseDisplay(MovingDisplay):
             As ``estimator.track`` takes them; of one trial an array.
         features : int, str or list of them, default=None
             By index or name; by default the one that varies most in the mean trial.
-        training : trials, default=None
-            Those of ``fit``. Their standard deviation from the mean is drawn as a band.
         body : DirectionCosines or Pipeline, default=None
             The fitted transformer of the features, with ``inverse_transform``. The body is then
             drawn, without the limbs that have a NaN cosine. In a pipeline one NaN hides the body.
         names : list of str, default=None
             The names of the trials that are drawn; by default their labels in X, or numbers.
-        ylabel, units : str, list of str or dict, default=None
-            Labels of the features and their units: of all, one each, or by name. By default their
-            names, and what tables tell in ``attrs["units"]``.
-        xlabel : str, default=None
-            The label of time axes, in place of that of the unit.
+        units : str, list of str or dict, default=None
+            The units of the features: of all, one each, or by name. By default what tables tell in
+            ``attrs["units"]``.
         frame : int, default=None
-            As in `plot`.
+            The frame of the longest trial that is drawn; the others are drawn at the same time. By
+            default the last.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -188,65 +165,30 @@ class PhaseDisplay(MovingDisplay):
         if features is None:
             features = [first_largest(live.mean_.var(axis=0))]
         shown = choose_features(features, feature_names)
-        spread = None
-        if training is not None:
-            warped = np.asarray(live.synchronizer_.match(training).warp(training))
-            spread = warped.reshape(-1, *live.mean_.shape).std(axis=0)[:, shown]
-        bodies, mean_body, skeleton = [None] * len(seen), None, None
+        display = cls()
+        bodies: list = [None] * (len(seen) + 1)
         if body is not None:
             skeleton = find_step(body, DirectionCosines)[1].skeleton.body()
-            *bodies, mean_body = (invert_poses(x, body, skeleton) for x in (*seen, live.mean_))
-        action = LearntAction(
-            live.n_frames_,
-            live.cyclic,
-            live.duration_ / (live.frame_rate or 1.0),
-            live.mean_[:, shown],
-            spread,
-            mean_body,
+            display.skeleton = skeleton
+            bodies = [invert_poses(x, body, skeleton) for x in (*seen, live.mean_)]
+        duration = live.duration_ / (live.frame_rate or 1.0)
+        display.action = LearntAction(
+            live.n_frames_, live.cyclic, duration, live.mean_[:, shown], bodies[-1]
         )
-        running = []
+        display.trials = []
         for k, (x, phases) in enumerate(zip(seen, tracked, strict=True)):
             stamps_of_trial = None if stamps is None else stamps[k]
-            times_of_trial = times_from_zero(stamps_of_trial, len(x), live.frame_rate)
-            left, afterwards = action.times_left(phases, times_of_trial), None
-            if not live.cyclic and not np.isnan(x).any():
-                afterwards = _final_phases(live, trials[k])
-            running.append(
-                RunningTrial(
-                    phases, times_of_trial, left, names[k], x[:, shown], afterwards, bodies[k]
-                )
-            )
-        known_units = units_of_columns(trials[0])
+            clock = times_from_zero(stamps_of_trial, len(x), live.frame_rate)
+            left = display.action.times_left(phases, clock)
+            running = RunningTrial(phases, clock, left, names[k], x[:, shown], bodies[k])
+            display.trials.append(running)
         labels = [feature_names[k] for k in shown]
-        return cls(
-            action,
-            running,
-            labels_of_signals(labels, known_units, ylabel, units),
-            skeleton,
-            xlabel or time_label(live.frame_rate),
-        ).plot(ax, frame=frame)
-
-    def plot(self, ax: AxesLike | None = None, *, frame: int | None = None) -> Self:
-        """Draw the state at a frame.
-
-        Parameters
-        ----------
-        ax : Axes or array-like of Axes, default=None
-            One of a figure's subplots is divided into the panels; or one axes a panel. None
-            makes a figure.
-        frame : int, default=None
-            A frame of the longest trial; the others are drawn at the same time. By default
-            the last.
-
-        Returns
-        -------
-        PhaseDisplay
-            The display itself.
-        """
-        longest = max((p.times for p in self.trials), key=lambda times: times[-1])
+        display.features = labels_of_signals(labels, units_of_columns(trials[0]), units)
+        display.xlabel = time_label(live.frame_rate)
+        longest = max((p.times for p in display.trials), key=lambda times: times[-1])
         last = len(longest) - 1
-        self._time = longest[last if frame is None else as_index(frame, last + 1, "frame")]
-        return super().plot(ax)
+        display.time = longest[last if frame is None else as_index(frame, last + 1, "frame")]
+        return display.plot(ax)
 
     def _layout(self):
         # Two panels beside each other; an odd last one has the whole width.
@@ -273,23 +215,18 @@ class PhaseDisplay(MovingDisplay):
             for axis in axes[curves_from:]:
                 axis.set_xlim(0, 1.02 * end or 1.0)
                 axis.set_xlabel(self.xlabel)
-            row.show(self._time)
+            row.show(self.time)
         # One legend for all curves.
         for axis in by_row[0, curves_from : curves_from + 2]:
-            legend_above([axis], *axis.get_legend_handles_labels(), n_cols=2)
+            handles, _ = axis.get_legend_handles_labels()
+            # Areas before lines.
+            handles.sort(key=lambda handle: hasattr(handle, "get_xdata"))
+            legend_above([axis], handles, n_cols=2)
 
     def _show(self, share):
         time = share * max(p.times[-1] for p in self.trials)
         for row in self.rows_:
             row.show(time)
-
-
-def _final_phases(live, x):
-    """The phases of the frames of a trial as they are known at its end."""
-    (tau,) = live.synchronizer_.match([x]).times
-    clock = np.arange(live.n_frames_)
-    # Where tau is constant, all phases in between are equally right.
-    return np.interp(np.linspace(0, clock[-1], len(x)), tau + 1e-9 * clock, clock)
 
 
 # -- what is drawn -----------------------------------------------------------------------
@@ -307,7 +244,6 @@ class LearntAction(NamedTuple):
     duration : float
         The mean duration in the unit of the times.
     mean : ndarray, shape (P, n_shown)
-    spread : ndarray (P, n_shown), or None
     body : ndarray (P, n_joints, n_dims), or None
         The mean body.
     """
@@ -316,7 +252,6 @@ class LearntAction(NamedTuple):
     cyclic: bool
     duration: float
     mean: np.ndarray
-    spread: np.ndarray | None
     body: np.ndarray | None
 
     def interpolate(self, phase, values):
@@ -348,8 +283,6 @@ class RunningTrial(NamedTuple):
         The time left.
     name : str
     seen : ndarray, shape (n_frames, n_shown)
-    afterwards : ndarray (n_frames,), or None
-        The phases as they are known at the end.
     body : ndarray (n_frames, n_joints, n_dims), or None
     """
 
@@ -358,7 +291,6 @@ class RunningTrial(NamedTuple):
     left: np.ndarray
     name: str
     seen: np.ndarray
-    afterwards: np.ndarray | None
     body: np.ndarray | None
 
 
@@ -388,34 +320,17 @@ class TrialRow:
             self.body = BodyPanel(axes.pop(0), skeleton)
         self.dial = PhaseDial(axes.pop(0))
         self._time_axes = axes
-        self._draw_phase(axes[0])
+        self.confidence = self.interval = None
+        (self.rest,) = axes[0].plot([], [], color=COLORS["mean"], linestyle=":", label="predicted")
+        self.phase = front_line(axes[0], [], [], color=COLORS["trial"], label="phase")
+        axes[0].set_ylim(0, 105)
+        axes[0].set_ylabel("phase (%)")
+        # Ticks need not be drawn again with the areas over them.
+        axes[0].set_axisbelow(True)
         self.curves = [
             FeaturePanel(axis, trial, action, k, name)
             for k, (axis, name) in enumerate(zip(axes[1:], features, strict=True))
         ]
-
-    def _draw_phase(self, axis):
-        grey, blue, orange = (COLORS[k] for k in ("shadow", "trial", "mean"))
-        self.confidence = _empty_area(axis, grey, 0.75, "confidence")
-        self.afterwards = None
-        trial, percent = self._trial, 100 / (self._action.n_frames - 1)
-        self.interval = _empty_area(axis, blue, _INTERVAL_OPACITY, "90 % band")
-        if trial.afterwards is not None:
-            ys = percent * trial.afterwards
-            (self.afterwards,) = axis.plot(
-                trial.times,
-                ys,
-                label="afterwards",
-                color=COLORS["pattern"],
-                linewidth=0.9,
-                linestyle="--",
-            )
-        (self.rest,) = axis.plot([], [], color=orange, linestyle=":", label="predicted")
-        self.phase = front_line(axis, [], [], color=blue, label="phase")
-        axis.set_ylim(0, 105)
-        axis.set_ylabel("phase (%)")
-        # Ticks need not be drawn again with the areas over them.
-        axis.set_axisbelow(True)
 
     def show(self, time):
         """Move to a time."""
@@ -428,13 +343,18 @@ class TrialRow:
         ahead = ahead if action.cyclic else min(ahead, last)
         number = cycle[now] if action.cyclic else None
         self.dial.show(phase[now] / last, ahead / last, rate[now], confidence[now], number)
-        # The line has a gap where a cycle begins.
+        axis, style = self._time_axes[0], {"color": COLORS["shadow"], "alpha": 0.75}
+        level = 100 * confidence[past]
+        self.confidence = _refilled(
+            self.confidence, axis, p.times[past], 0, level, label="confidence", **style
+        )
+        # The line and its band have a gap where a cycle begins.
         begins = 1 + np.flatnonzero(np.diff(cycle[past]))
-        line = p.times[past], 100 / last * phase[past]
-        self.phase.set_data(*(np.insert(values, begins, np.nan) for values in line))
-        _fill_area(self.confidence, p.times[past], 0, 100 * confidence[past])
-        bounds_so_far = (100 / last * bound[past] for bound in (lower, upper))
-        _fill_area(self.interval, p.times[past], *bounds_so_far, begins)
+        so_far = np.stack([p.times, *(100 / last * values for values in (phase, lower, upper))])
+        times, percent, *band = np.insert(so_far[:, past], begins, np.nan, axis=1)
+        self.phase.set_data(times, percent)
+        style = {"color": COLORS["trial"], "alpha": _INTERVAL_OPACITY}
+        self.interval = _refilled(self.interval, axis, times, *band, label="90 % band", **style)
         if action.cyclic:
             stop = p.times[now] + action.duration
             for axis in self._time_axes:
@@ -513,8 +433,6 @@ class FeaturePanel:
         self._times, self._seen = trial.times, trial.seen[:, k]
         self._action, self._k = action, k
         blue, orange = COLORS["trial"], COLORS["mean"]
-        label = "_nolegend_" if action.spread is None else "90 % band"
-        self.band = _empty_area(axis, COLORS["envelope"], 0.35, label)
         (self.to_come,) = axis.plot(
             self._times,
             self._seen,
@@ -527,10 +445,7 @@ class FeaturePanel:
         (self.expected,) = axis.plot([], [], color=orange, linewidth=2, label="predicted")
         self.seen = front_line(axis, [], [], color=blue, label="seen")
         (self.now,) = axis.plot([], [], "o", color=blue, markersize=5, zorder=5)
-        mean, half_width = action.mean[:, k], 0
-        if action.spread is not None:
-            half_width = _BAND * action.spread[:, k]
-        values = np.concatenate([self._seen, mean - half_width, mean + half_width])
+        values = np.concatenate([self._seen, action.mean[:, k]])
         low, high = np.nanmin(values), np.nanmax(values)
         margin = 0.06 * (high - low) or 1.0
         axis.set_ylim(low - margin, high + margin)
@@ -543,21 +458,10 @@ class FeaturePanel:
         self.now.set_data([self._times[now]], [self._seen[now]])
         mean = self._action.interpolate(phases, self._action.mean[:, self._k])
         self.expected.set_data(times, mean)
-        if self._action.spread is not None:
-            half_width = _BAND * self._action.interpolate(phases, self._action.spread[:, self._k])
-            _fill_area(self.band, times, mean - half_width, mean + half_width)
 
 
-def _empty_area(axis, color, alpha, label):
-    from matplotlib.collections import PolyCollection
-
-    area = PolyCollection([], facecolor=color, alpha=alpha, linewidth=0, zorder=1, label=label)
-    return axis.add_collection(area, autolim=False)
-
-
-def _fill_area(area, xs, lower, upper, gaps=()):
-    """Fill the area between two curves, but for gaps before these indices."""
-    lower, upper = np.broadcast_to(lower, xs.shape), np.broadcast_to(upper, xs.shape)
-    there, back = np.column_stack([xs, upper]), np.column_stack([xs, lower])
-    pairs = zip(np.split(there, gaps), np.split(back, gaps), strict=True)
-    area.set_verts([np.concatenate([a, b[::-1]]) for a, b in pairs if len(a)])
+def _refilled(area, axis, xs, lower, upper, **style):
+    """The area between two curves, which takes the place of an earlier one."""
+    if area is not None:
+        area.remove()
+    return axis.fill_between(xs, lower, upper, linewidth=0, zorder=1, **style)

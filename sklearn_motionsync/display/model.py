@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -34,35 +33,22 @@ from .base import (
 _BAND_TITLES = {
     "points": "band holds single poses, not whole trials",
     "trials": "band holds {:.3g} % of new people's trials",
-    "mean": "band holds the mean of all people, {:.3g} % sure",
 }
 # Rounding of the largest bound, in units of the last place.
 _ROUNDING = 64
 
 
-@dataclass(eq=False, repr=False)
 class ActionModelDisplay(Display):
     """A learnt action: its mean, a band about it, and the trials behind (Fig. 3d).
 
     Use `from_estimator`.
 
-    Parameters
+    Attributes
     ----------
     mean, lower, upper : ndarray, shape (P, n_shown)
         The mean of the model, and the bounds of the band.
     trials : ndarray, shape (n_sequences, P, n_shown), or None
         Synchronised.
-    axis : TimeAxis
-        The clock of the pattern, and the key-frames on it.
-    ylabels : list of str
-        The labels of the features.
-    titles : (str, str)
-        What the band holds and what it is, for the legend.
-    departures : bool
-        Whether the parts of trials outside the band are violet.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         The panels, one a feature.
     mean_ : list of Line2D
@@ -72,7 +58,7 @@ class ActionModelDisplay(Display):
     trials_ : list of LineCollection
         The trials, one collection a feature; empty without trials.
     departures_ : list of LineCollection
-        The parts of trials outside the band; empty if they are not drawn.
+        The parts of trials outside the band; empty without trials.
     keyframes_ : list of list of Line2D
         The key-frames, for each panel; empty without any.
 
@@ -96,8 +82,7 @@ class ActionModelDisplay(Display):
     trials: np.ndarray | None
     axis: TimeAxis
     ylabels: Sequence[str]
-    titles: tuple[str, str]
-    departures: bool
+    titles: tuple[str, str]  # what the band holds, and what it is
 
     def __repr__(self):
         return f"ActionModelDisplay({list(self.ylabels)})"
@@ -109,9 +94,8 @@ class ActionModelDisplay(Display):
         X: TrialsLike | None = None,
         *,
         features: Features | None = None,
-        band: Literal["points", "trials", "mean"] | None = None,
+        band: Literal["points", "trials"] | None = None,
         unit: Unit = "frames",
-        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         xlabel: str | None = None,
         ax: AxesLike | None = None,
@@ -130,19 +114,18 @@ class ActionModelDisplay(Display):
             be features of the poses, such as ``"pelvis_height"``: the model is then fitted again
             on the poses of the trials that it keeps. By default the first four of the
             model. What scalers before the model do to its own features is undone.
-        band : {"points", "trials", "mean"}, default=None
+        band : {"points", "trials"}, default=None
             The band about the mean, which holds poses of new subjects one by one
             (`ActionModel.envelope`); or their trials from the first frame to the last, with
-            probability ``coverage`` of the model (``simultaneous=True``); or the mean of the
-            population (`ActionModel.mean_envelope`). In features of poses it includes what the
-            `ASpace` leaves out. By default ``"trials"``, without X ``"points"``. Parts of
-            trials outside the band are violet, except that of the mean.
+            probability ``coverage`` of the model (``simultaneous=True``). In features of poses it
+            includes what the `ASpace` leaves out. By default ``"trials"``, without X
+            ``"points"``. Parts of trials outside the band are violet.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames or per cent of the pattern, or seconds; the clock then lasts
             as long as the median trial of X.
-        ylabel, units : str, list of str or dict, default=None
-            Labels of the features and their units: of all, one each, or by name. By default their
-            names, and what tables tell in ``attrs["units"]``.
+        units : str, list of str or dict, default=None
+            The units of the features: of all, one each, or by name. By default what tables tell in
+            ``attrs["units"]``.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None
@@ -181,31 +164,34 @@ class ActionModelDisplay(Display):
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
         shown = view.whole if band == "trials" else view.synchronised
-        lower, upper, what = _band_of(view, band)
-        drawn: list = [view.model.mean_, lower, upper, *(() if shown is None else shown)]
-        n_frames = len(view.model.mean_)
+        model, what = view.model, "mean ± {:.3g} {}standard deviations"
+        if band == "points":
+            lower, upper = model.envelope()
+            what = what.format(model.n_std, "")
+        else:
+            factor = model.simultaneous_factor()
+            lower, upper = (model.mean_ + sign * factor * view.predicted for sign in (-1, 1))
+            what = what.format(factor, "predicted ")
+        drawn: list = [model.mean_, lower, upper, *(() if shown is None else shown)]
+        n_frames = len(model.mean_)
         known_units: dict = {}
-        if view.model is view.model_of_points:
-            before, model = find_step(estimator, ActionModel)
+        if model is view.model_of_points:
+            before, _ = find_step(estimator, ActionModel)
             undo, known_units = undo_scaling(before, X, model.mean_.shape[1])
             drawn = [undo(x) for x in drawn]
-        mean, lower, upper, *trials = (x[:, chosen] for x in drawn)
+        display = cls()
+        display.mean, display.lower, display.upper, *trials = (x[:, chosen] for x in drawn)
+        display.trials = np.stack(trials) if trials else None
         if view.curves is None:
             facts = TrialFacts.of([n_frames], params.get("frame_rate"))
         else:
             facts = view.curves.facts
         lasting = facts.durations() if unit == "seconds" else None
         keyframes = _keyframes_of(estimator, n_frames, params.get("keyframes"))
-        return cls(
-            mean,
-            lower,
-            upper,
-            np.stack(trials) if trials else None,
-            TimeAxis(unit, n_frames, None, lasting, xlabel, keyframes=keyframes),
-            labels_of_signals([view.names[i] for i in chosen], known_units, ylabel, units),
-            (_BAND_TITLES[band].format(100 * view.model.coverage), what),
-            X is not None and band != "mean",
-        ).plot(ax)
+        display.axis = TimeAxis(unit, n_frames, None, lasting, xlabel, keyframes=keyframes)
+        display.ylabels = labels_of_signals([view.names[i] for i in chosen], known_units, units)
+        display.titles = (_BAND_TITLES[band].format(100 * model.coverage), what)
+        return display.plot(ax)
 
     def _layout(self):
         count = len(self.ylabels)
@@ -227,7 +213,6 @@ class ActionModelDisplay(Display):
         if self.trials is not None:
             handles.append(self.trials_[0])
             labels.append(counted(len(self.trials), "trial"))
-        if self.departures:
             lower, upper = self._outer_bounds()
             outside = (self.trials < lower) | (self.trials > upper)
             handles.append(self.departures_[0])
@@ -246,29 +231,13 @@ class ActionModelDisplay(Display):
             axis.plot(clock, bound, color=COLORS["pattern"], linewidth=0.9)
         if self.trials is not None:
             behind = self.trials[:, :, i]
-            lines = curves(
-                axis,
-                [clock] * len(behind),
-                behind,
-                colors=COLORS["trial"],
-                linestyles="dashed",
-                linewidths=0.7,
-                alpha=0.5,
-            )
+            style = {"colors": COLORS["trial"], "linestyles": "dashed", "linewidths": 0.7}
+            lines = curves(axis, [clock] * len(behind), behind, alpha=0.5, **style)
             self.trials_.append(lines)
-        if self.departures:
             lower, upper = (bound[:, i] for bound in self._outer_bounds())
             xs, ys = parts_outside(self.trials[:, :, i], lower, upper)
-            self.departures_.append(
-                curves(
-                    axis,
-                    self.axis.convert(xs),
-                    ys,
-                    colors=COLORS["departure"],
-                    linewidths=1.4,
-                    zorder=3,
-                )
-            )
+            style = {"colors": COLORS["departure"], "linewidths": 1.4, "zorder": 3}
+            self.departures_.append(curves(axis, self.axis.convert(xs), ys, **style))
         self.mean_ += axis.plot(clock, self.mean[:, i], color=COLORS["mean"], linewidth=2)
 
     def _outer_bounds(self):
@@ -286,15 +255,3 @@ def _keyframes_of(estimator, n_frames, keyframes):
         return None
     same = getattr(synchronizer, "n_frames_", None) == n_frames
     return named_keyframes(synchronizer, keyframes) if same else None
-
-
-def _band_of(view, band):
-    """The bounds of the band of a model, and what it is."""
-    model, what = view.model, "mean ± {:.3g} {}standard deviations"
-    if band == "mean":
-        return *model.mean_envelope(random_state=0), "where the mean may be"
-    if band == "points":
-        return *model.envelope(), what.format(model.n_std, "")
-    factor = model.simultaneous_factor()
-    reach = factor * view.predicted
-    return model.mean_ - reach, model.mean_ + reach, what.format(factor, "predicted ")

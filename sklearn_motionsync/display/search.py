@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -23,28 +22,18 @@ _BOTTOM, _STRIP = 0.3, 0.06
 _MAX_PANELS = 12
 
 
-@dataclass(eq=False, repr=False)
 class SearchDisplay(Display):
     """The hits of a search along takes: their times, scores, and the threshold.
 
     Use `from_estimator`.
 
-    Parameters
+    Attributes
     ----------
     origin : DataFrame
         ``take``, ``start``, ``stop``, ``score`` and ``threshold`` of the hits.
-    lengths : dict
-        The number of frames of each take, by its label: one panel each.
-    segments : DataFrame, default=None
-        ``take``, ``start`` and ``stop`` of the true segments of the action.
-    xlabel : str, default=None
-        The label of the time of the takes.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         The panels, one a take.
-    hits_ : list of PatchCollection
+    hits_ : list of BarContainer
         The hits of each take; grey are those below the threshold.
 
     Examples
@@ -60,9 +49,8 @@ class SearchDisplay(Display):
     """
 
     origin: pd.DataFrame
-    lengths: Mapping[Any, int]
-    segments: pd.DataFrame | None = None
-    xlabel: str | None = None
+    lengths: Mapping[Any, int]  # of the takes, by their labels
+    segments: pd.DataFrame | None = None  # ``take``, ``start`` and ``stop`` of true ones
 
     def __repr__(self):
         count, takes = int(self._accepted().sum()), len(self.lengths)
@@ -75,7 +63,6 @@ class SearchDisplay(Display):
         X: TrialsLike,
         *,
         segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
-        xlabel: str | None = None,
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
@@ -89,8 +76,6 @@ class SearchDisplay(Display):
             The takes of `find_trials`.
         segments : DataFrame or list of (take, start, stop), default=None
             True segments of the action, by the labels of the takes.
-        xlabel : str, default=None
-            The label of the time of the takes, in place of "frame of the take".
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
@@ -107,18 +92,19 @@ class SearchDisplay(Display):
         ValueError
             If segments are of other takes; or as from `find_trials`.
         """
-        _, origin = find_trials(pattern, X, threshold=None, **params)
+        display = cls()
+        _, display.origin = find_trials(pattern, X, threshold=None, **params)
         takes = as_trials(X)
         lengths = dict(zip(labels_of(takes)[0], map(len, takes), strict=True))
-        true = None
+        display.lengths = lengths
         if segments is not None:
-            true = pd.DataFrame(segments, columns=["take", "start", "stop"])
-            unknown = [take for take in true["take"] if take not in lengths]
+            display.segments = pd.DataFrame(segments, columns=["take", "start", "stop"])
+            unknown = [take for take in display.segments["take"] if take not in lengths]
             if unknown:
                 raise ValueError(
                     f"segments names the take {unknown[0]!r}; the takes are {list(lengths)[:8]}."
                 )
-        return cls(origin, lengths, true, xlabel).plot(ax)
+        return display.plot(ax)
 
     def _shown(self):
         return list(self.lengths)[:_MAX_PANELS]
@@ -128,24 +114,25 @@ class SearchDisplay(Display):
         return [(i, 0) for i in range(count)], (count, 1), (WIDTH, 1.1 + 1.3 * count)
 
     def _draw(self):
-        from matplotlib.collections import PatchCollection
         from matplotlib.lines import Line2D
-        from matplotlib.patches import Patch, Rectangle
+        from matplotlib.patches import Patch
 
         shown = self._shown()
         accepted, self.hits_ = self._accepted(), []
         for axis, take in zip(self.axes_, shown, strict=True):
             in_take = (self.origin["take"] == take).to_numpy()
-            boxes, colors = [], []
             rows = self.origin[in_take]
-            for start, stop, score, is_hit in zip(
-                rows["start"], rows["stop"], rows["score"], accepted[in_take], strict=True
-            ):
-                height = max(score - _BOTTOM, 0)
-                boxes.append(Rectangle((start, _BOTTOM), stop - start, height))
-                colors.append(COLORS["trial"] if is_hit else COLORS["shadow"])
-            self.hits_.append(PatchCollection(boxes, facecolors=colors, edgecolors="white"))
-            axis.add_collection(self.hits_[-1])
+            colors = [COLORS["trial" if is_hit else "shadow"] for is_hit in accepted[in_take]]
+            bars = axis.bar(
+                rows["start"],
+                np.maximum(rows["score"] - _BOTTOM, 0),
+                rows["stop"] - rows["start"],
+                bottom=_BOTTOM,
+                align="edge",
+                color=colors,
+                edgecolor="white",
+            )
+            self.hits_.append(bars)
             if self.segments is not None:
                 true = self.segments[(self.segments["take"] == take).to_numpy()]
                 spans = np.column_stack([true["start"], true["stop"] - true["start"]]).tolist()
@@ -157,8 +144,7 @@ class SearchDisplay(Display):
             axis.set_ylim(_BOTTOM - _STRIP * (self.segments is not None), 1)
             title = f"take {take}" if len(self.lengths) > 1 else ""
             axis.set_title(title, fontsize="medium")
-        time = self.xlabel or "frame of the take"
-        self._label_axes(self.axes_, ["score (1: alike)"] * len(shown), time)
+        self._label_axes(self.axes_, ["score (1: alike)"] * len(shown), "frame of the take")
         handles = [
             Patch(facecolor=COLORS["trial"], label="hit"),
             Patch(facecolor=COLORS["shadow"], label="below the threshold"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from numbers import Real
 from textwrap import fill
 from typing import Any, Self
@@ -35,7 +34,7 @@ from .bodies import (
     read_positions,
     stage,
 )
-from .limb_departures import draw_departures, split_at_synchronizer
+from .limb_departures import set_departures, split_at_synchronizer
 
 # The largest number of panels in a row.
 _PANELS_A_ROW = 4
@@ -47,7 +46,6 @@ _SPACING = 0.7
 _N_TRIALS, _N_SAMPLES = 6, 12
 
 
-@dataclass(eq=False, repr=False)
 class SkeletonDisplay(MovingDisplay):
     """Stick figures of joint positions: poses side by side, or trials in motion.
 
@@ -62,29 +60,18 @@ class SkeletonDisplay(MovingDisplay):
     the landmarks; the joints of a skeleton without bones are drawn as points. Positions in a plane
     are drawn as the camera saw them, whatever the ``azimuth``.
 
-    Parameters
+    Attributes
     ----------
     scenes : list of list of ndarray (n_frames_i, n_joints, n_dims)
         The trials of each panel: joint positions in axes of which the second is vertical.
-    skeleton : Skeleton or None
-        Joints and bones; None draws all joints as points, without bones.
     titles : list of str
         One a panel.
-    durations : list of list of float, default=None
-        The duration of each trial of each panel in frames; by default its number of frames
-        less one.
-    labels : list of str, default=None
-        Names under the trials of a panel, which are then side by side instead of in one place.
-    marked : list of list of (int, int), default=None
-        The violet bones of each panel, such as those of limbs that depart from the action: pairs
-        of ``skeleton.bones``. All others are grey.
-    behind : list of list of ndarray (n_frames_i, n_joints, n_dims), default=None
+    marked : list of list of (int, int), or None
+        The violet bones of each panel: pairs of ``skeleton.bones``. All others are grey.
+    behind : list of list of ndarray (n_frames_i, n_joints, n_dims), or None
         Trials of each panel that are drawn behind as pale shadows, such as the mean.
-    heading : str, default=None
+    heading : str or None
         The heading of a figure that the display makes.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         The panels.
     bones_ : list of dict
@@ -110,7 +97,9 @@ class SkeletonDisplay(MovingDisplay):
     scenes: Sequence[Sequence[np.ndarray]]
     skeleton: Skeleton | None
     titles: Sequence[str]
+    # How many frames each trial of each panel lasts, if that is not what it has.
     durations: Sequence[Sequence[float]] | None = None
+    # Names under the trials of a panel, which are then side by side instead of in one place.
     labels: Sequence[str] | None = None
     marked: Sequence[Sequence[tuple[int, int]]] | None = None
     behind: Sequence[Sequence[np.ndarray]] | None = None
@@ -155,9 +144,11 @@ class SkeletonDisplay(MovingDisplay):
             for i, x in enumerate(as_trials(X, skeleton))
         ]
         shown = as_frames(frames, min(map(len, bodies)))
-        titles = [f"frame {frame}" for frame in shown]
-        scenes = [[x[[frame]] for x in bodies] for frame in shown]
-        return cls(scenes, skeleton, titles).plot(ax, azimuth=azimuth)
+        display = cls()
+        display.skeleton = skeleton
+        display.titles = [f"frame {frame}" for frame in shown]
+        display.scenes = [[x[[frame]] for x in bodies] for frame in shown]
+        return display.plot(ax, azimuth=azimuth)
 
     @classmethod
     def from_trials(
@@ -198,14 +189,15 @@ class SkeletonDisplay(MovingDisplay):
         """
         X = as_trials(X, skeleton)
         bodies = [place_on_floor(read_positions(x, skeleton, i), skeleton) for i, x in enumerate(X)]
-        labels = names_of_trials(names, X)
-        scenes, titles, durations = [bodies], ["each at its own pace"], None
+        display = cls()
+        display.skeleton, display.labels = skeleton, names_of_trials(names, X)
+        display.scenes, display.titles = [bodies], ["each at its own pace"]
         if match is not None:
             warped = match.warp([x.reshape(len(x), -1) for x in bodies])
-            scenes.append(list(warped.reshape(*warped.shape[:2], *bodies[0].shape[1:])))
-            titles, recorded = ["as recorded", "aligned"], [float(len(x) - 1) for x in bodies]
-            durations = [recorded, [float(np.median(recorded))] * len(bodies)]
-        display = cls(scenes, skeleton, titles, durations=durations, labels=labels)
+            aligned = list(warped.reshape(*warped.shape[:2], *bodies[0].shape[1:]))
+            recorded = [float(len(x) - 1) for x in bodies]
+            display.scenes, display.titles = [bodies, aligned], ["as recorded", "aligned"]
+            display.durations = [recorded, [float(np.median(recorded))] * len(bodies)]
         return display.plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
@@ -315,7 +307,8 @@ class SkeletonDisplay(MovingDisplay):
 
         floor = np.zeros(skeleton.n_dims)
         floor[1] = bodies_of(mean)[..., 1].min()
-        scenes, titles = [], []
+        scenes: list[list[np.ndarray]] = []
+        titles: list[str] = []
         for frame in _frames_of_model(frames, model.n_frames_):
             samples = model.sample(_N_SAMPLES, frame=frame, random_state=random_state)
             accepted = model.accepts(samples, frame)
@@ -325,7 +318,9 @@ class SkeletonDisplay(MovingDisplay):
                 f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
-        return cls(scenes, skeleton, titles).plot(ax, azimuth=azimuth)
+        display = cls()
+        display.scenes, display.skeleton, display.titles = scenes, skeleton, titles
+        return display.plot(ax, azimuth=azimuth)
 
     @classmethod
     def from_departures(
@@ -391,16 +386,9 @@ class SkeletonDisplay(MovingDisplay):
         sklearn_motionsync.model.find_departures : The departures as a table.
         ActionModelDisplay : The curves of the trial, and the band that they leave.
         """
-        scenes, skeleton, titles, marked, behind, heading = draw_departures(
-            estimator,
-            X,
-            params,
-            f"{cls.__name__}.from_departures",
-            trial=trial,
-            frames=frames,
-            reference=reference,
-        )
-        display = cls(scenes, skeleton, titles, marked=marked, behind=behind, heading=heading)
+        display, caller = cls(), f"{cls.__name__}.from_departures"
+        asked = {"trial": trial, "frames": frames, "reference": reference}
+        set_departures(display, estimator, X, params, caller, **asked)
         return display.plot(ax, azimuth=azimuth)
 
     def plot(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -40,7 +39,6 @@ _COVERAGE = 0.9
 _FAINTEST, _BAND, _BANDS = 0.01, 0.2, 0.4
 
 
-@dataclass(eq=False, repr=False)
 class SynchronizationDisplay(Display):
     """Features over time before and after synchronisation, and the offsets (Figs. 1 and 3).
 
@@ -48,7 +46,7 @@ class SynchronizationDisplay(Display):
     They are counted from the mean offset of all trials, so this mean is a line at 0. Use
     `from_estimator`.
 
-    Parameters
+    Attributes
     ----------
     before : list of ndarray (n_frames_i, n_shown)
         The features of the trials at their own frames; NaN in gaps.
@@ -56,19 +54,6 @@ class SynchronizationDisplay(Display):
         The features on the clock of the pattern.
     match : Match
         The warps, their intervals, and which trials are doubtful.
-    axis : TimeAxis
-        The times of the frames of trials and pattern, and the key-frames.
-    ylabels : list of str
-        The labels of the features.
-    pattern : ndarray, shape (P, n_shown)
-        Drawn in front.
-    titles : (str, str)
-        The titles of the panels before and after.
-    groups : list of str, default=None
-        The group of each trial, which determines its colour.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         For each feature the panels before and after, then that of the offsets.
     before_, after_ : list of LineCollection
@@ -105,9 +90,10 @@ class SynchronizationDisplay(Display):
     match: Match
     axis: TimeAxis
     ylabels: Sequence[str]
-    pattern: np.ndarray
-    titles: tuple[str, str]
-    groups: Sequence[str] | None = None
+    pattern: np.ndarray  # (P, n_shown)
+    titles: tuple[str, str]  # of the panels before and after
+    groups: Sequence[str] | None = None  # of each trial
+    warps: bool = True  # whether to draw the offsets
 
     def __repr__(self):
         count = counted(len(self.before), "trial")
@@ -122,7 +108,6 @@ class SynchronizationDisplay(Display):
         features: Features | None = None,
         y: Labels | None = None,
         unit: Unit = "frames",
-        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         xlabel: str | None = None,
         warps: bool = True,
@@ -146,9 +131,9 @@ class SynchronizationDisplay(Display):
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames; per cent of a trial, and of the pattern; or seconds of
             the trials as recorded, and of the median trial on the clock.
-        ylabel, units : str, list of str or dict, default=None
-            Labels of the features and their units: of all, one each, or by name. By default their
-            names, and what tables tell in ``attrs["units"]``.
+        units : str, list of str or dict, default=None
+            The units of the features: of all, one each, or by name. By default what tables tell in
+            ``attrs["units"]``.
         xlabel : str, default=None
             The label of time axes, such as ``"% gait cycle"``, in place of that of the unit.
         warps : bool, default=True
@@ -175,51 +160,29 @@ class SynchronizationDisplay(Display):
         names = names_of_features(before, synchronizer, width)
         chosen = choose_features(features, names)
         undo, known_units = undo_scaling(before, X, width)
-        match, shown = reached.match(), [undo(x)[:, chosen] for x in trials]
-        axis = TimeAxis(
+        display = cls()
+        display.match = reached.match()
+        display.before = [undo(x)[:, chosen] for x in trials]
+        display.after = display.match.warp(display.before)
+        display.pattern = undo(synchronizer.pattern_)[:, chosen]
+        display.axis = TimeAxis(
             unit,
-            match.times.shape[1],
-            [len(x) for x in shown],
+            len(display.pattern),
+            [len(x) for x in trials],
             reached.facts.durations() if unit == "seconds" else None,
             xlabel,
             keyframes=named_keyframes(synchronizer, reached.params.get("keyframes")),
             trial_keyframes=reached.keyframes,
         )
+        chosen_names = [names[i] for i in chosen]
+        display.ylabels = labels_of_signals(chosen_names, known_units, units)
         index = index_of_pattern(synchronizer, trials)
-        return cls(
-            shown,
-            match.warp(shown),
-            match,
-            axis,
-            labels_of_signals([names[i] for i in chosen], known_units, ylabel, units),
-            undo(synchronizer.pattern_)[:, chosen],
-            ("as recorded", "the pattern" if index is None else f"the pattern, trial {index}"),
-            None if y is None else names_of_groups(y, len(shown), name="y"),
-        ).plot(ax, warps=warps)
-
-    def plot(self, ax: AxesLike | None = None, *, warps: bool = True) -> Self:
-        """Draw.
-
-        Parameters
-        ----------
-        ax : Axes or array-like of Axes, default=None
-            One of a figure's subplots is divided into the panels; or one axes a panel, for each
-            feature before and after, then the offsets. None makes a figure.
-        warps : bool, default=True
-            Whether to draw the offsets.
-
-        Returns
-        -------
-        SynchronizationDisplay
-            The display itself.
-        """
-        self._warps = bool(warps)
-        return super().plot(ax)
-
-    @property
-    def times(self) -> np.ndarray:
-        """The times of the match, (n_sequences, P), in frames."""
-        return self.match.times
+        pattern = "the pattern" if index is None else f"the pattern, trial {index}"
+        display.titles = ("as recorded", pattern)
+        if y is not None:
+            display.groups = names_of_groups(y, len(trials), name="y")
+        display.warps = bool(warps)
+        return display.plot(ax)
 
     @property
     def doubtful(self) -> np.ndarray | None:
@@ -229,11 +192,11 @@ class SynchronizationDisplay(Display):
     def _layout(self):
         n_rows = len(self.ylabels)
         cells = [(row, column) for row in range(n_rows) for column in (0, 1)]
-        cells += [(slice(n_rows, None), slice(None))] * self._warps
+        cells += [(slice(n_rows, None), slice(None))] * self.warps
         # The offsets are as high as two rows of features.
-        n_all = n_rows + self._warps * min(n_rows, 2)
+        n_all = n_rows + self.warps * min(n_rows, 2)
         n_lines = -(-len(set(self.groups or ())) // 3)
-        height = max(2.6, 1.6 * n_all + 0.8) + self._warps + 0.2 * n_lines
+        height = max(2.6, 1.6 * n_all + 0.8) + self.warps + 0.2 * n_lines
         return cells, (n_all, 2), (WIDTH, height)
 
     def _draw(self):
@@ -265,13 +228,13 @@ class SynchronizationDisplay(Display):
         self._label_axes(lefts, self.ylabels, self.axis.trial_label)
         self._label_axes(rights, [""] * n_rows, self.axis.label)
         before, pattern = self.titles
-        dotted = "" if self._warps else self._describe_doubtful(", dotted: ")
+        dotted = "" if self.warps else self._describe_doubtful(", dotted: ")
         title = f"{before}\n{counted(len(self.before), 'trial')}{dotted}"
         lefts[0].set_title(title, fontsize="medium")
         means = ", thick: group means" if styles else ""
         rights[0].set_title(f"aligned{means}\nblack: {pattern}", fontsize="medium")
         self.offsets_ = self.intervals_ = None
-        if self._warps:
+        if self.warps:
             self._draw_offsets(self.axes_[-1], clock, colors)
         # Names are below the curves, once.
         on_clock = [*rights, *self.axes_[2 * n_rows :]]

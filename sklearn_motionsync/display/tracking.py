@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from textwrap import fill
 from typing import Self
 
@@ -31,7 +30,6 @@ _PANEL = 1.15
 _LINE_LENGTH = 18
 
 
-@dataclass(eq=False, repr=False)
 class TrackingDisplay(Display):
     """A tracked body with hidden parts: the estimate with its band, and the true course.
 
@@ -39,27 +37,10 @@ class TrackingDisplay(Display):
     true course if it is known. Grey are times at which the feature was hidden, hatched those at
     which the tracker was lost. Below are phase and rate. Use `from_estimator`.
 
-    Parameters
+    Attributes
     ----------
     track : Track
         The track of one take.
-    truth : ndarray (n_frames, n_features), or None
-        The true features.
-    observed : ndarray, shape (n_frames, n_features)
-        The observed features, NaN where they were hidden.
-    times : ndarray, shape (n_frames,)
-        The times of the frames; the first one is 0.
-    n_frames : int
-        The length of the clock.
-    names : list of str
-        The labels of all features.
-    shown : list of int
-        The features that are drawn.
-    xlabel : str
-        The label of the time axis.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         One a feature, then those of the phase and the rate.
     estimates_, truths_, observed_ : list of Line2D
@@ -87,22 +68,18 @@ class TrackingDisplay(Display):
     """
 
     track: Track
-    truth: np.ndarray | None
+    # The true features (n_frames, n_features), and those that were seen, NaN where hidden.
+    truth: np.ndarray | None = None
     observed: np.ndarray
-    times: np.ndarray
-    n_frames: int
-    names: Sequence[str]
-    shown: Sequence[int]
+    times: np.ndarray  # of the frames; the first one is 0
+    n_frames: int  # of the clock
+    names: Sequence[str]  # of all features, with their units
+    shown: Sequence[int]  # the features that are drawn
     xlabel: str
 
-    @property
-    def hidden(self) -> np.ndarray:
-        """Where features were hidden, (n_frames, n_features)."""
-        return np.isnan(self.observed)
-
     def __repr__(self):
-        n_frames, n_features = self.hidden.shape
-        count = int(self.hidden.any(axis=0).sum())
+        n_frames, n_features = self.observed.shape
+        count = int(np.isnan(self.observed).any(axis=0).sum())
         return (
             f"TrackingDisplay({n_frames} frames of {counted(n_features, 'feature')}, {count} of "
             "them hidden at times)"
@@ -119,7 +96,6 @@ class TrackingDisplay(Display):
         features: Features | None = None,
         names: Sequence[str] | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
-        xlabel: str | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Track a take, and draw the estimate.
@@ -142,8 +118,6 @@ class TrackingDisplay(Display):
         units : str, list of str or dict, default=None
             The units of the features for their labels: of all, one each, or by name. By default
             what tables tell in ``attrs["units"]``.
-        xlabel : str, default=None
-            The label of the time axis, in place of that of the unit.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -165,33 +139,32 @@ class TrackingDisplay(Display):
                 f"X must be one take, 2-D, got an array-like with {np.ndim(X)} axes: "
                 "of several takes give one."
             )
-        (track,) = estimator.track([X], None if times is None else [times])
-        n_frames, n_features = track.poses.shape
-        if truth is not None and np.shape(truth) != (n_frames, n_features):
-            raise ValueError(
-                f"The truth must have the shape {(n_frames, n_features)}, got {np.shape(truth)}."
-            )
+        display = cls()
+        (display.track,) = estimator.track([X], None if times is None else [times])
+        poses = display.track.poses
+        n_frames, n_features = poses.shape
+        if truth is not None:
+            if np.shape(truth) != poses.shape:
+                raise ValueError(
+                    f"The truth must have the shape {poses.shape}, got {np.shape(truth)}."
+                )
+            display.truth = np.asarray(truth, dtype=np.float64)
         if names is None:
             names = names_of_features(None, estimator, n_features)
         names = as_names(names, n_features, "names", "features")
-        observed, frame_rate = np.asarray(X, dtype=np.float64), estimator.frame_rate
+        display.observed = np.asarray(X, dtype=np.float64)
         if features is None:
-            hidden = np.isnan(observed).any(axis=0)
+            hidden = np.isnan(display.observed).any(axis=0)
             candidates = np.flatnonzero(hidden if hidden.any() else ~hidden)
-            variance = np.var(track.poses[:, candidates], axis=0)
-            shown = candidates[np.argsort(-variance, kind="stable")][:_N_FEATURES].tolist()
+            variance = np.var(poses[:, candidates], axis=0)
+            display.shown = candidates[np.argsort(-variance, kind="stable")][:_N_FEATURES].tolist()
         else:
-            shown = choose_features(features, names)
-        return cls(
-            track,
-            None if truth is None else np.asarray(truth, dtype=np.float64),
-            observed,
-            times_from_zero(times, n_frames, frame_rate),
-            estimator.n_frames_,
-            labels_of_signals(names, units_of_columns(X), units=units),
-            shown,
-            xlabel or time_label(frame_rate),
-        ).plot(ax)
+            display.shown = choose_features(features, names)
+        display.times = times_from_zero(times, n_frames, estimator.frame_rate)
+        display.n_frames = estimator.n_frames_
+        display.names = labels_of_signals(names, units_of_columns(X), units)
+        display.xlabel = time_label(estimator.frame_rate)
+        return display.plot(ax)
 
     def _layout(self):
         count = len(self.shown) + 2
@@ -210,8 +183,8 @@ class TrackingDisplay(Display):
         (self.rate_,) = lower.plot(self.times, self.track.rates, color=blue)
         # The axis may be shared with another display.
         lower.set_ylim(0, max(lower.get_ylim()[1], 1.1 * max(1, *self.track.rates)))
-        any_hidden = self.hidden[:, shown].any(axis=1)
-        masks = [*self.hidden[:, shown].T, any_hidden, any_hidden]
+        hidden = np.isnan(self.observed[:, shown])
+        masks = [*hidden.T, hidden.any(axis=1), hidden.any(axis=1)]
         grey, violet = COLORS["shadow"], COLORS["departure"]
         self.hidden_ = self._shade(
             masks, label="hidden", color=grey, alpha=0.7, linewidth=0, zorder=0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -15,23 +14,17 @@ from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .base import COLORS, WIDTH, AxesLike, Display, front_line, legend_above
 
 
-@dataclass(eq=False, repr=False)
 class TrellisDisplay(Display):
     """The disparity space of one pair of trials, and the path through it (Fig. 2).
 
     Use `from_estimator`.
 
-    Parameters
+    Attributes
     ----------
     space : Bunch
         From `DenseSynchronizer.disparity_space`: frames, offsets, costs, and the best path.
     warp : ndarray, shape (P,)
         The final offsets Delta(p), after consensus, smoothing and refinement.
-    names : (str, str)
-        Names of the pattern and of the trial.
-
-    Attributes
-    ----------
     axes_ : list of Axes
         The panel.
     image_ : AxesImage
@@ -55,7 +48,7 @@ class TrellisDisplay(Display):
 
     space: Bunch
     warp: np.ndarray
-    names: tuple[str, str]
+    names: tuple[str, str]  # of the pattern and of the trial
 
     def __repr__(self):
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
@@ -93,11 +86,13 @@ class TrellisDisplay(Display):
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
         synchronizer, trials = reached.synchronizer, reached.trials
-        space = synchronizer.disparity_space(trials, trial, **reached.params)
-        warp = reached.match().offsets[trial]
+        display = cls()
+        display.space = synchronizer.disparity_space(trials, trial, **reached.params)
+        display.warp = reached.match().offsets[trial]
         index = index_of_pattern(synchronizer, trials)
-        names = ("pattern" if index is None else f"pattern {index}", f"trial {trial}")
-        return cls(space, warp, names).plot(ax)
+        pattern = "pattern" if index is None else f"pattern {index}"
+        display.names = (pattern, f"trial {trial}")
+        return display.plot(ax)
 
     def _layout(self):
         return [(0, 0)], (1, 1), (WIDTH, 4)

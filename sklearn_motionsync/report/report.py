@@ -19,18 +19,7 @@ from ..comparison.curves import AlignedCurves
 from ..comparison.groups import compare_aligned
 from ..comparison.study import GroupsOfPeople, Study
 from ..display.arguments import labels_of_signals
-from ..display.base import (
-    WIDTH,
-    TimeAxis,
-    curves,
-    front_line,
-    group_styles,
-    legend_above,
-    named_keyframes,
-    panels,
-    pyplot,
-    text_of_label,
-)
+from ..display.base import TimeAxis, named_keyframes, pyplot, text_of_label
 from ..display.groups import GroupDisplay
 from ..display.synchronization import SynchronizationDisplay
 from ..inputs.features import choose_features
@@ -235,7 +224,7 @@ def _add_signals(page, trials, features):
         picture(
             draw_signals(trials, shown),
             f"Curves of {counted(len(trials.names), 'trial')}, on the left time-normalised, on the "
-            f"right aligned. {finding}",
+            f"right aligned, and below their offsets. {finding}",
         ),
         paragraph(note),
         table_of(spread, "Standard deviation between trials", ("time-normalised", "aligned"))
@@ -264,11 +253,8 @@ def _add_timing(page, trials):
         paragraph(finding, "finding"),
         paragraph(
             "An offset is how much later than the pattern a trial is, less where it is earlier. "
-            "All trials begin and end with the pattern: one that is slower throughout is not late."
-        ),
-        picture(
-            draw_offsets(trials),
-            f"Offsets of {counted(len(trials.names), 'trial')} along the pattern. {finding}",
+            "All trials begin and end with the pattern: one that is slower throughout is not late. "
+            "The figure above counts offsets from the mean of all trials."
         ),
         table_of(trials.timing(), "Offsets of groups") if "group" in trials.design else "",
         table_of(table[columns], "Offsets of trials"),
@@ -495,13 +481,8 @@ def own_figures():
             plt.close(number)
 
 
-def _keyframes_of(aligned):
-    """The key-frames on the clock, by name; None if there are none."""
-    return named_keyframes(aligned.reached.synchronizer, aligned.reached.params.get("keyframes"))
-
-
 def draw_signals(trials, shown):
-    """Signals time-normalised and aligned, side by side.
+    """Signals time-normalised and aligned, side by side, and the offsets of all trials.
 
     Parameters
     ----------
@@ -511,42 +492,18 @@ def draw_signals(trials, shown):
     """
     aligned, pattern = trials.aligned, trials.pattern
     n_frames, n = len(aligned.clock), len(aligned.even)
-    lasting, keyframes = [aligned.clock[-1]] * n, _keyframes_of(aligned)
-    after = aligned.curves[:, :, shown]
-    is_mean = pattern is None
-    display = SynchronizationDisplay(
-        list(aligned.even[:, :, shown]),
-        after,
-        aligned.match,
-        TimeAxis(aligned.unit, n_frames, [n_frames] * n, lasting, keyframes=keyframes),
-        [trials.signals[i] for i in shown],
-        after.mean(axis=0) if is_mean else after[pattern],
-        ("time-normalised", "their mean" if is_mean else "the pattern"),
-        list(map(str, trials.design["group"])) if "group" in trials.design else None,
-    ).plot(warps=False)
-    display.axes_[-2].set_xlabel(display.axes_[-1].get_xlabel())
+    lasting, reached = [aligned.clock[-1]] * n, aligned.reached
+    keyframes = named_keyframes(reached.synchronizer, reached.params.get("keyframes"))
+    display = SynchronizationDisplay()
+    display.match = aligned.match
+    display.before, after = list(aligned.even[:, :, shown]), aligned.curves[:, :, shown]
+    display.after = after
+    display.pattern = after.mean(axis=0) if pattern is None else after[pattern]
+    display.titles = ("time-normalised", "their mean" if pattern is None else "the pattern")
+    display.axis = TimeAxis(aligned.unit, n_frames, [n_frames] * n, lasting, keyframes=keyframes)
+    display.ylabels = [trials.signals[i] for i in shown]
+    if "group" in trials.design:
+        display.groups = list(map(str, trials.design["group"]))
+    display.plot()
+    display.axes_[-3].set_xlabel(display.axes_[-2].get_xlabel())
     return display.figure_
-
-
-def draw_offsets(trials):
-    """The offsets of all trials, and the mean of each group."""
-    aligned = trials.aligned
-    offsets, clock = aligned.offsets, aligned.clock
-    time = TimeAxis.of_clock(aligned.unit, clock, keyframes=_keyframes_of(aligned))
-    figure, (axis,) = panels(None, [(0, 0)], (1, 1), (WIDTH, 3.4))
-    names = list(trials.design.get("group", [""] * len(offsets)))
-    styles = group_styles(names)
-    colors = [styles[name][0] for name in names]
-    curves(axis, [clock] * len(offsets), offsets, colors=colors, linewidths=0.9, alpha=0.4)
-    means = [
-        front_line(axis, clock, offsets[np.array(names) == name].mean(axis=0), color=c, linestyle=s)
-        for name, (c, s) in styles.items()
-    ]
-    axis.axhline(0, color="0.4", linewidth=0.8, zorder=0)
-    axis.set_xlim(clock[0], clock[-1])
-    axis.set_xlabel(time.label)
-    axis.set_ylabel(f"later than\nthe pattern ({UNITS[aligned.unit]})")
-    time.draw_keyframes([axis], axis)
-    labels = [f"mean of {name}" for name in styles] if "group" in trials.design else ["their mean"]
-    legend_above([axis], means, labels)
-    return figure

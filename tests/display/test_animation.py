@@ -6,26 +6,18 @@ import pytest
 from sklearn_motionsync.display import SkeletonDisplay
 
 
-@pytest.fixture(scope="module")
-def player(bending):
+def test_player_loads_nothing_from_a_network_and_its_buttons_have_icons(bending):
     display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
-    return display.animate(seconds=0.2, fps=10).to_jshtml()
-
-
-def test_player_loads_nothing_from_a_network(player):
+    player = display.animate(seconds=0.2, fps=10).to_jshtml()
     assert not re.search(r"<link|@import|url\(|(src|href)=.https?:", player)
+    buttons = re.findall(r"<button ([^>]*)>\s*(.*?)\s*</button>", player, re.DOTALL)
+    assert len({picture for _, picture in buttons}) == len(buttons) == 9
+    for attributes, picture in buttons:
+        assert re.search('title="[^"]+"', attributes)
+        assert re.fullmatch(r"<svg .*<path .*</svg>", picture)
 
 
-def test_every_button_has_an_icon_and_a_title(player):
-    buttons = re.findall(r"<button ([^>]*)>(.*?)</button>", player, re.DOTALL)
-    assert len(buttons) == 9
-    assert all(re.search('title="[^"]+"', attributes) for attributes, _ in buttons)
-    pictures = [picture.strip() for _, picture in buttons]
-    assert all(re.fullmatch(r"<svg .*<path .*</svg>", p) for p in pictures), pictures
-    assert len(set(pictures)) == 9
-
-
-def test_saving_computes_the_layout_once_and_draws_each_picture_once(bending, tmp_path):
+def test_the_layout_is_computed_once_and_each_picture_drawn_once(bending, tmp_path):
     display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
     figure, drawn = display.figure_, []
     animation, layout = display.animate(seconds=1, fps=6), figure.get_layout_engine()

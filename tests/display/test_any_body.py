@@ -155,9 +155,8 @@ def test_without_bones_joints_are_points_and_limbs_join_landmarks():
                 in_order(bones_drawn(whole, panel, side)),
             )
         assert len(display.heads_[panel].get_xdata()) == 16
-    shown = SkeletonDisplay([[np.zeros((2, 16, 3)) + np.arange(3)]], bare, ["a"],
-                            behind=[[np.zeros((2, 16, 3))]]).plot()  # fmt: skip
-    assert len(ends_of_bones(shown.behind_[0])) == 14
+    display.behind = display.scenes
+    assert len(ends_of_bones(display.plot().behind_[0])) == 14
 
 
 def test_points_without_a_skeleton_have_two_or_three_axes():

@@ -32,13 +32,12 @@ def test_artists_agree_with_the_estimator(segmenter):
     np.testing.assert_allclose(cuts[:-1], origin["start"][origin["complete"]] / 100)
     assert [a.get_xlabel() for a in display.axes_] == ["lag (s)", "time of the take (s)"]
     assert display.axes_[1].get_ylabel() == "x0"
-    cycles = len(cuts) - 1
-    assert repr(display).endswith(f"period {found.period:.1f} frames, {cycles} whole cycles)")
-    other = CycleDisplay.from_estimator(
-        segmenter, GAIT.data, unit="percent", ylabel="ankle", units="deg", xlabel="%"
-    )
-    assert other.axes_[1].get_ylabel() == "ankle (deg)"
-    assert other.axes_[1].get_xlabel() == "%"
+    cycles = f"{len(cuts) - 1} whole cycles"
+    assert repr(display).endswith(f"period {found.period:.1f} frames, {cycles})")
+    # The first of the takes, in per cent of it.
+    other = CycleDisplay.from_estimator(segmenter, GAIT.data, unit="percent", units="deg")
+    assert other.axes_[1].get_ylabel() == "x0 (deg)"
+    assert other.axes_[1].get_xlabel() == "% of the take"
     np.testing.assert_array_equal(other.curve_.get_ydata(), GAIT.data[0][:, HIP])
     assert other.curve_.get_xdata()[-1] == 100
 
@@ -51,18 +50,11 @@ def test_a_take_without_cycles_is_drawn_without_cuts():
     assert display.axes_[1].get_ylabel() == "left ankle ahead (legs)"
 
 
-def test_from_estimator_refuses(segmenter):
-    for change, message in (
-        ({"unit": "hours"}, "unit must be one of"),
-        ({"unit": "seconds"}, "The frame rate of .* is not known"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            CycleDisplay.from_estimator(segmenter, GAIT.data, **change)
-
-
-def test_a_table_tells_its_frame_rate(segmenter):
-    x = make_gait(1, takes=True, random_state=0).data[0]
+def test_a_table_tells_its_frame_rate_and_other_units_are_refused(segmenter):
+    x = GAIT.data[1]
     table = pd.DataFrame(x, index=pd.Index(np.arange(len(x)) / 100, name="time"))
     told = CycleDisplay.from_estimator(CycleSegmenter(), [table], unit="seconds")
-    asked = CycleDisplay.from_estimator(CycleSegmenter(), [x], unit="seconds", frame_rate=100)
-    assert told.axes_[1].get_xlim() == pytest.approx(asked.axes_[1].get_xlim())
+    assert told.axes_[1].get_xlim() == pytest.approx((0, (len(x) - 1) / 100))
+    for unit, message in (("hours", "unit must be"), ("seconds", "The frame rate of .* is not")):
+        with pytest.raises(ValueError, match=message):
+            CycleDisplay.from_estimator(segmenter, GAIT.data, unit=unit)

@@ -138,12 +138,11 @@ def test_trials_seconds_and_labels(pipe):
         trials=True,
         unit="seconds",
         frame_rate=100,
-        ylabel="knee",
         units={"knee_flexion": "degrees"},
         xlabel="time of the cycle (s)",
     )
     assert display.axes_[1].get_xlabel() == "time of the cycle (s)"
-    assert display.axes_[0].get_ylabel() == "knee (degrees)"
+    assert display.axes_[0].get_ylabel() == "knee_flexion\n(degrees)"
     assert display.axes_[1].get_ylabel().endswith("the mean (s)")
     seconds = (np.median([len(x) for x in TRIALS]) - 1) / 100
     assert display.axes_[1].get_xlim() == pytest.approx((0, seconds))
@@ -179,7 +178,7 @@ def test_signals_are_what_reaches_an_aspace():
     [
         ({"statistic": "sem"}, "statistic must be one of"),
         ({"features": "elbow"}, "There is no feature 'elbow'"),
-        ({"ylabel": ["a"]}, "ylabel must be a list of text, one for each of the 4 signals"),
+        ({"units": ["a"]}, "units must be a list of text, one for each of the 4 signals"),
         ({"units": {"elbow": "deg"}}, "units: there is no signal 'elbow'; there are hip_flexion"),
         ({"unit": "seconds"}, "frame_rate"),
         ({"signals": TRIALS[:3]}, "one sequence for each of 28 trials, got 3"),

@@ -3,63 +3,46 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-import pytest
+from artists import texts, ys
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, PartSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import LagDisplay
 from sklearn_motionsync.synchronizers import Lags
 
-N_FRAMES = 21
+# Twelve trials of four people; the arm is late in the second half, the leg never.
+VALUES = np.random.default_rng(0).normal(0, 0.3, (12, 2, 21))
+VALUES[:, 0, 11:] += 5
+LAGS = Lags(VALUES, ["arm", "leg"], "frames", np.repeat(range(4), 3), list("abcd"))
 
 
-@pytest.fixture(scope="module")
-def lags():
-    """Twelve trials of four subjects; the arm is late in the second half, the leg never."""
-    rng, groups = np.random.default_rng(0), np.repeat(range(4), 3)
-    values = rng.normal(0, 0.3, (12, 2, N_FRAMES))
-    values[:, 0, 11:] += 5
-    return Lags(values, ["arm", "leg"], "frames", groups, list("abcd"))
-
-
-def test_map_shows_the_mean_and_hatches_intervals_around_zero(lags):
-    display = LagDisplay(lags).plot()
-    table = lags.over_time()
-    np.testing.assert_array_equal(display.map_.get_array().ravel(), table["mean"])
-    low, high = display.map_.get_clim()
-    assert low == -high == -table["mean"].abs().max()
-    arm, leg = (patch.get_paths() for patch in display.unsure_)
-    assert max(path.vertices[:, 0].max() for path in arm) < 12
-    assert max(path.vertices[:, 0].max() for path in leg) > 15
-    assert all(patch.get_hatch() for patch in display.unsure_)
-    title = "2 parts behind the rest of the body, 12 trials of 4 people"
-    assert display.axes_[0].get_title() == title
-    names = [label.get_text() for label in display.axes_[0].get_yticklabels()]
-    icc = lags.summary()["icc"]
-    assert names == [f"arm\nICC {icc['arm']:.2f}", f"leg\nICC {icc['leg']:.2f}"]
-
-
-def test_curves_show_mean_interval_and_standard_deviation(lags):
-    display = LagDisplay(lags, "% gait cycle").plot()
-    assert {axis.get_xlabel() for axis in display.axes_} == {"% gait cycle"}
+def test_curves_show_mean_interval_and_standard_deviation():
+    display = LagDisplay(LAGS, "% gait cycle").plot()
+    assert [axis.get_xlabel() for axis in display.axes_] == ["% gait cycle"] * 2
+    assert [axis.get_ylabel() for axis in display.axes_] == ["late by\n(frames)", ""]
     for i, part in enumerate(["arm", "leg"]):
-        table = lags.over_time().loc[part]
+        table = LAGS.over_time().loc[part]
+        np.testing.assert_array_equal(display.means_[i].get_xdata(), range(21))
         np.testing.assert_array_equal(display.means_[i].get_ydata(), table["mean"])
-        drawn = [np.array(line)[:, 1] for line in display.spreads_[i].get_segments()]
-        np.testing.assert_allclose(
-            drawn, [table["mean"] - table["sd"], table["mean"] + table["sd"]]
-        )
-        heights = display.intervals_[i].get_paths()[0].vertices[:, 1]
-        assert (heights.min(), heights.max()) == pytest.approx(
-            (table["low"].min(), table["high"].max())
-        )
-    assert "people" in display.axes_[1].get_legend().get_texts()[1].get_text()
+        ends = [table["mean"] - table["sd"], table["mean"] + table["sd"]]
+        np.testing.assert_allclose(ys(display.spreads_[i]), ends)
+        heights = display.intervals_[i].get_paths()[0].vertices[1:-1, 1]
+        np.testing.assert_allclose(heights[:21], table["low"])
+        np.testing.assert_allclose(heights[22:][::-1], table["high"])
+        low, high = display.axes_[i].get_ylim()
+        assert low == -high < -5
+    icc = LAGS.summary()["icc"]
+    titles = [f"arm, ICC {icc['arm']:.2f}", f"leg, ICC {icc['leg']:.2f}"]
+    assert [axis.get_title() for axis in display.axes_] == titles
+    labels = ["mean, 12 trials of 4 people", "95 % interval (people)", "± 1 SD of trials"]
+    assert texts(display.axes_[0]) == labels
 
 
-def test_a_single_trial_has_no_interval(lags):
-    display = LagDisplay(Lags(lags.values[:1], lags.parts, "percent")).plot()
-    assert display.axes_[0].get_title() == "2 parts behind the rest of the body, 1 trial"
-    assert display.unsure_[0].get_paths()
+def test_a_single_trial_has_no_interval():
+    display = LagDisplay(Lags(VALUES[:1], LAGS.parts, "percent")).plot()
+    assert texts(display.axes_[0])[:2] == ["mean, 1 trial", "95 % interval (trials)"]
+    assert display.intervals_[0].get_paths() == []
+    np.testing.assert_allclose(ys(display.spreads_[1]), [VALUES[0, 1]] * 2)
     assert display.axes_[0].get_xlim() == (0, 100)
 
 
@@ -73,7 +56,7 @@ def test_from_estimator_of_a_pipeline_on_axes_of_the_user():
     X = pipe[:-1].transform(bunch.data)
     np.testing.assert_array_equal(display.lags.values, sync.lags(X).values)
     assert display.figure_ is ax.figure
-    assert [a.get_title() for a in display.axes_[1:]] == display.lags.parts
+    assert [a.get_title() for a in display.axes_] == display.lags.parts
     tables = [pd.DataFrame(x, columns=bunch.skeleton.column_names) for x in bunch.data]
     for x in tables:
         x.attrs["frame_rate"] = 50.0

@@ -59,7 +59,7 @@ def phases(pipe, poses):
     live = OnlineSynchronizer(frame_rate=50).fit(poses)
     features = ["torso_y", "left_forearm_z"]
     return display.PhaseDisplay.from_estimator(
-        live, poses[:2], training=poses, body=pipe[0], features=features, frame=30
+        live, poses[:2], body=pipe[0], features=features, frame=30
     )
 
 

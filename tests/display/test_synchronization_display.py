@@ -106,9 +106,11 @@ def test_axes_of_the_user(bunch, pipe):
     for axis in display.axes_:
         assert box.x0 - 1e-9 <= axis.get_position().x0 <= axis.get_position().x1 <= box.x1 + 1e-9
     _, axes = plt.subplots(2, 1)
-    display.plot(axes, warps=False)
+    display.warps = False
+    display.plot(axes)
     assert display.axes_ == list(axes)
     assert display.offsets_ is None
+    display.warps = True
     with pytest.raises(ValueError, match="or 3 axes, one a panel; got 2"):
         display.plot(axes)
     with pytest.raises(ValueError, match="one of a figure's subplots"):
