@@ -159,19 +159,43 @@ def test_without_bones_joints_are_points_and_limbs_join_landmarks():
     assert len(ends_of_bones(display.plot().behind_[0])) == 14
 
 
-def test_points_without_a_skeleton_have_two_or_three_axes():
+# -- without a skeleton ---------------------------------------------------------------------
+
+
+def points_drawn(x, panel=0, **given):
+    """The places of joints without a skeleton, (n_joints, 2)."""
+    display = SkeletonDisplay.from_positions(x, None, **given)
+    assert all(len(lines.get_paths()) == 0 for lines in display.bones_[panel].values())
+    return np.transpose(display.heads_[panel].get_data())
+
+
+def test_joints_without_a_skeleton_are_points():
+    """They are moved to the floor and not turned."""
+    x = BUNCH.data[0] + np.tile([5.0, 3.0, -2.0], 15)
+    points = x.reshape(-1, 15, 3)
+    expected = points[4, :, :2] - [points[4, :, 0].mean(), points[..., 1].min()]
+    np.testing.assert_allclose(points_drawn(x, frames=[4], azimuth=0), expected)
+    for joint in (0, 7):
+        markers = np.delete(points, joint, axis=1).reshape(len(x), -1)
+        assert len(points_drawn(markers, frames=1)) == 14
+
+
+@pytest.mark.parametrize("path", [[[0.0, 1, 0]] * 5, [[0.0, t, 0] for t in range(5)]])
+def test_a_single_marker_is_drawn(path):
+    hidden = np.array(path)
+    assert len(points_drawn(hidden, frames=2)) == 1
+    hidden[1] = np.nan
+    SkeletonDisplay.from_positions(hidden, None, frames=[0, 1]).figure_.canvas.draw()
+
+
+def test_points_have_two_or_three_axes():
     """In space, or in the plane if names or the number of columns say so."""
     x = np.random.default_rng(0).normal(size=(6, 12))
-    assert len(SkeletonDisplay.from_positions(x, None, frames=[1]).heads_[0].get_xdata()) == 4
+    assert len(points_drawn(x, frames=[1])) == 4
     named = pd.DataFrame(x, columns=columns("abcdef", "xy"))
-    display = SkeletonDisplay.from_positions(named, None, frames=[1])
-    across, up = display.heads_[0].get_data()
-    np.testing.assert_allclose(np.diff(across), np.diff(x[1, ::2]))
-    np.testing.assert_allclose(np.diff(up), np.diff(x[1, 1::2]))
-    display = SkeletonDisplay.from_positions(x[:, :8], None, frames=[1])
-    assert display.scenes[0][0].shape == (1, 4, 2)
+    steps = np.diff(points_drawn(named, frames=[1]), axis=0)
+    np.testing.assert_allclose(steps, np.diff(x[1].reshape(6, 2), axis=0))
+    assert len(points_drawn(x[:, :8], frames=[1])) == 4
     match = Match(np.linspace(0, 5, 6)[np.newaxis])
     display = SkeletonDisplay.from_trials([x[:, :8]], None, match=match)
     assert display.scenes[1][0].shape == (6, 4, 2)
-    with pytest.raises(ValueError, match=r"positions of joints are \(n_frames, 3 \* n_joints\)"):
-        SkeletonDisplay.from_positions(x[:, :7], None)

@@ -1,5 +1,7 @@
 """Arguments of displays: those that are refused name the argument, its value, and what is valid."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -68,17 +70,6 @@ def refuses(call, message):
         call()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"ax": []}, r"ax must be Axes of matplotlib, got \[\]"),
-        ({"ax": "left"}, "ax must be Axes of matplotlib, got 'left'"),
-    ],
-)
-def test_synchronization_refuses(pipe, arguments, message):
-    refuses(lambda: SynchronizationDisplay.from_estimator(pipe, POSITIONS, **arguments), message)
-
-
 def test_nan_is_drawn_as_a_gap():
     gaps = [with_one(X[0], np.nan, slice(0, 4)), *X[1:]]
     display = SynchronizationDisplay.from_estimator(LinearSynchronizer(10).fit(X), gaps)
@@ -87,14 +78,20 @@ def test_nan_is_drawn_as_a_gap():
     display.figure_.canvas.draw()
 
 
-def test_unknown_feature_is_refused(pipe):
-    def draw(features):
-        SynchronizationDisplay.from_estimator(pipe, POSITIONS, features=features)
-
-    for bad in (3, -1, 1.5, True, "aspace9", [0, "x1"]):
-        message = "There is no feature .*there are 3: aspace0, aspace1, aspace2"
-        refuses(lambda features=bad: draw(features), message)
-    refuses(lambda: draw([]), "at least one feature")
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"ax": []}, r"ax must be Axes of matplotlib, got \[\]"),
+        ({"ax": "left"}, "ax must be Axes of matplotlib, got 'left'"),
+        ({"features": []}, "at least one feature"),
+        *(
+            ({"features": bad}, "There is no feature .*there are 3: aspace0, aspace1, aspace2")
+            for bad in (3, -1, 1.5, True, "aspace9", [0, "x1"])
+        ),
+    ],
+)
+def test_synchronization_refuses(pipe, arguments, message):
+    refuses(lambda: SynchronizationDisplay.from_estimator(pipe, POSITIONS, **arguments), message)
 
 
 @pytest.mark.parametrize("trial", [4, -1, 1.5, "1", None])
@@ -179,12 +176,10 @@ def test_from_estimator_refuses_unknown_trials(pipe, trials):
     )
 
 
-@pytest.mark.parametrize("frames", [[20], [1.5], None])
-def test_from_model_refuses_unknown_frames(pipe, frames):
-    refuses(lambda: SkeletonDisplay.from_model(pipe, frames=frames), "frames, .* from 0 to 19")
-
-
-def test_from_model_accepts_frames_and_shares(pipe):
+def test_from_model_takes_frames_and_shares(pipe):
+    for frames in ([20], [1.5], None):
+        draw = partial(SkeletonDisplay.from_model, pipe, frames=frames)
+        refuses(draw, "frames, .* from 0 to 19")
     for frames in (0.5, [0.5], np.float32([0.5]), 10, [10.0]):
         titles = SkeletonDisplay.from_model(pipe, frames=frames).titles
         assert titles[0] == "frame 10\nmean pose"
@@ -199,30 +194,8 @@ def test_from_model_needs_inverse_transform():
     refuses(lambda: SkeletonDisplay.from_model(pipe), message)
 
 
-@pytest.mark.parametrize("arguments", [{"seconds": 0}, {"seconds": np.nan}, {"fps": -1}])
-def test_animate_refuses_impossible_durations(arguments):
-    refuses(lambda: draw_positions().animate(**arguments), "seconds and fps must be above 0")
-    refuses(lambda: draw_positions().animate(seconds=1e9), r"are 1.5e\+10 pictures, more than")
-
-
-# -- without a skeleton ---------------------------------------------------------------------
-
-
-def test_joints_without_a_skeleton_are_points():
-    """They are moved to the floor and not turned."""
-    x = POSITIONS[0] + np.tile([5.0, 3.0, -2.0], 15)
-    display = draw_positions(x, None, frames=[4], azimuth=0)
-    assert all(len(lines.get_paths()) == 0 for lines in display.bones_[0].values())
-    points = x.reshape(-1, 15, 3)
-    expected = points[4, :, :2] - [points[4, :, 0].mean(), points[..., 1].min()]
-    np.testing.assert_allclose(np.transpose(display.heads_[0].get_data()), expected)
-    for joint in (0, 7):
-        markers = np.delete(points, joint, axis=1).reshape(len(x), -1)
-        assert len(draw_positions(markers, None, frames=1).heads_[0].get_xdata()) == 14
-
-
-@pytest.mark.parametrize("path", [[[0.0, 1, 0]] * 5, [[0.0, t, 0] for t in range(5)]])
-def test_a_single_marker_is_drawn(path):
-    draw_positions(np.array(path), None, frames=2).figure_.canvas.draw()
-    hidden = with_one(path, np.nan, 1)
-    assert len(draw_positions(hidden, None, frames=[0, 1]).axes_) == 2
+def test_animate_refuses_impossible_durations():
+    display = draw_positions()
+    for arguments in ({"seconds": 0}, {"seconds": np.nan}, {"fps": -1}):
+        refuses(partial(display.animate, **arguments), "seconds and fps must be above 0")
+    refuses(lambda: display.animate(seconds=1e9), r"are 1.5e\+10 pictures, more than")

@@ -34,6 +34,15 @@ def poses(pipe):
     return pipe[0].transform(BUNCH.data)
 
 
+def departures(pipe, poses):
+    return display.SkeletonDisplay.from_departures(pipe, [BUNCH.data[0][::-1]])
+
+
+def lags(pipe, poses):
+    parts = PartSynchronizer(synchronizer=DenseSynchronizer(30)).fit(poses)
+    return display.LagDisplay.from_estimator(parts, poses, groups=BUNCH.actor)
+
+
 def norm(pipe, poses):
     groups = ["norm"] * 6 + ["new"] * 2
     found = compare_to_norm(pipe, BUNCH.data, groups, norm="norm")
@@ -71,41 +80,31 @@ def tracking(pipe, poses):
     return display.TrackingDisplay.from_estimator(tracker, seen, truth=poses[0], names=names)
 
 
+def of_pipeline(name, method="from_estimator", X=BUNCH.data, **given):
+    """What draws a display of the pipeline, and of trials if there are any."""
+    trials = () if X is None else (X,)
+
+    def draw(pipe, poses):
+        return getattr(getattr(display, name), method)(pipe, *trials, **given)
+
+    return draw
+
+
+AGES = ["young"] * 4 + ["old"] * 4
 DRAWN = {
-    "synchronization": lambda pipe, poses: display.SynchronizationDisplay.from_estimator(
-        pipe, BUNCH.data, y=BUNCH.actor
+    "synchronization": of_pipeline("SynchronizationDisplay", y=BUNCH.actor),
+    "synchronization in seconds": of_pipeline(
+        "SynchronizationDisplay", features=[0], unit="seconds", frame_rate=50
     ),
-    "synchronization in seconds": lambda pipe, poses: display.SynchronizationDisplay.from_estimator(
-        pipe, BUNCH.data, features=[0], unit="seconds", frame_rate=50
-    ),
-    "model": lambda pipe, poses: display.ActionModelDisplay.from_estimator(
-        pipe, BUNCH.data, band="trials"
-    ),
-    "poses": lambda pipe, poses: display.SkeletonDisplay.from_positions(
-        BUNCH.data[0], BUNCH.skeleton
-    ),
-    "poses of a model": lambda pipe, poses: display.SkeletonDisplay.from_model(
-        pipe, random_state=0
-    ),
-    "departures": lambda pipe, poses: display.SkeletonDisplay.from_departures(
-        pipe, [BUNCH.data[0][::-1]]
-    ),
-    "bodies": lambda pipe, poses: display.SkeletonDisplay.from_estimator(pipe, BUNCH.data),
-    "groups": lambda pipe, poses: display.GroupDisplay.from_estimator(
-        pipe, BUNCH.data, ["young"] * 4 + ["old"] * 4, units="m", features=range(4)
-    ),
-    "lags": lambda pipe, poses: display.LagDisplay.from_estimator(
-        PartSynchronizer(synchronizer=DenseSynchronizer(30)).fit(poses),
-        poses,
-        groups=BUNCH.actor,
-        unit="percent",
-    ),
-    "gait": lambda pipe, poses: display.GaitDisplay.from_positions(
-        WALK.data, WALK.skeleton, frame_rate=100
-    ),
-    "trellis": lambda pipe, poses: display.TrellisDisplay.from_estimator(
-        pipe[:-1], BUNCH.data, trial=1
-    ),
+    "model": of_pipeline("ActionModelDisplay", band="trials"),
+    "poses": lambda *_: display.SkeletonDisplay.from_positions(BUNCH.data[0], BUNCH.skeleton),
+    "poses of a model": of_pipeline("SkeletonDisplay", "from_model", None, random_state=0),
+    "departures": departures,
+    "bodies": of_pipeline("SkeletonDisplay"),
+    "groups": of_pipeline("GroupDisplay", y=AGES, units="m", features=range(4)),
+    "lags": lags,
+    "gait": lambda *_: display.GaitDisplay.from_positions(WALK.data, WALK.skeleton, frame_rate=100),
+    "trellis": of_pipeline("TrellisDisplay", trial=1),
     "norm": norm,
     "search": search,
     "cycles": cycles,

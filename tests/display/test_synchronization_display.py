@@ -39,22 +39,17 @@ def test_features_before_and_after_and_warps(bunch, pipe):
         assert display.axes_[2 * row].get_ylabel() == f"aspace{feature}"
         assert line.get_zorder() >= display.after_[row].get_zorder()
     offsets = synchronizer.match(points).offsets
-    for drawn, offset in zip(ys(display.offsets_), offsets, strict=True):
-        mean = sum(offsets) / len(offsets)
-        np.testing.assert_allclose(drawn, offset - mean, atol=1e-12)
+    np.testing.assert_allclose(ys(display.offsets_), offsets - offsets.mean(axis=0), atol=1e-12)
     assert display.axes_[4].get_ylabel() == "later than\nthe mean (frames)"
     low, high = display.axes_[0].get_ylim()
     assert low <= min(x[:, 2].min() for x in points) <= max(x[:, 2].max() for x in points) <= high
-
-
-def test_title_names_the_pattern(bunch, pipe):
-    display = SynchronizationDisplay.from_estimator(pipe, bunch.data)
-    assert f"trial {pipe[2].pattern_index_}" in display.axes_[1].get_title()
-    assert display.group_means_ == [[], [], []]
-    others = [x for i, x in enumerate(bunch.data) if i != pipe[2].pattern_index_]
-    title = SynchronizationDisplay.from_estimator(pipe, others, features=0).axes_[1].get_title()
-    assert "pattern" in title
-    assert "trial" not in title
+    assert display.group_means_ == [[], []]
+    # The title names the pattern, if it is among the trials.
+    index = pipe[2].pattern_index_
+    assert display.axes_[1].get_title() == f"aligned\nblack: the pattern, trial {index}"
+    others = [x for i, x in enumerate(bunch.data) if i != index]
+    display = SynchronizationDisplay.from_estimator(pipe, others, features=0)
+    assert display.axes_[1].get_title() == "aligned\nblack: the pattern"
 
 
 def test_the_mean_of_each_group_is_in_front(bunch, pipe):
@@ -73,7 +68,7 @@ def test_the_mean_of_each_group_is_in_front(bunch, pipe):
     assert texts(display.axes_[0]) == ["young", "old", "one"]
 
 
-def test_univariate_rows_and_tables_are_accepted(bunch):
+def test_rows_tables_and_unnamed_features_are_accepted(bunch):
     rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
     display = SynchronizationDisplay.from_estimator(DenseSynchronizer(20).fit(rows), rows)
     assert display.after.shape == (5, 20, 1)
@@ -85,13 +80,9 @@ def test_univariate_rows_and_tables_are_accepted(bunch):
             assert display.ylabels == ["hip"]
             np.testing.assert_array_equal(display.before[2][:, 0], frames[2]["hip"])
             np.testing.assert_array_equal(display.after[0, :, 0], linear.transform(frames)[0, :, 1])
-
-
-def test_unnamed_features_are_numbered(bunch):
     some = FunctionTransformer(lambda X: [x[:, :3] for x in X])
-    pipe = make_pipeline(some, DenseSynchronizer(20), ActionModel()).fit(bunch.data)
-    assert SynchronizationDisplay.from_estimator(pipe, bunch.data).ylabels[0] == "x0"
-    assert ActionModelDisplay.from_estimator(pipe).ylabels == ["x0", "x1", "x2"]
+    pipe = make_pipeline(some, LinearSynchronizer(20)).fit(bunch.data)
+    assert SynchronizationDisplay.from_estimator(pipe, bunch.data).ylabels == ["x0", "x1", "x2"]
 
 
 def test_axes_of_the_user(bunch, pipe):
@@ -106,29 +97,30 @@ def test_axes_of_the_user(bunch, pipe):
     for axis in display.axes_:
         assert box.x0 - 1e-9 <= axis.get_position().x0 <= axis.get_position().x1 <= box.x1 + 1e-9
     _, axes = plt.subplots(2, 1)
-    display.warps = False
-    display.plot(axes)
-    assert display.axes_ == list(axes)
-    assert display.offsets_ is None
-    display.warps = True
     with pytest.raises(ValueError, match="or 3 axes, one a panel; got 2"):
         display.plot(axes)
+    display.warps = False
+    assert display.plot(axes).axes_ == list(axes)
+    assert display.offsets_ is None
     with pytest.raises(ValueError, match="one of a figure's subplots"):
         display.plot(plt.figure().add_axes([0, 0, 1, 1]))
 
 
-def test_units_of_the_synchronization_display(bunch, pipe):
+def test_units_of_time_and_frame_rates_of_tables(bunch, pipe):
     lengths = np.array([len(x) for x in bunch.data])
     times = pipe[2].match(pipe[:2].transform(bunch.data)).times
-    rates = np.linspace(20, 100, 9)
-    for unit, rate, ends, last in (
-        ("frames", None, lengths - 1, P - 1),
-        ("percent", None, np.full(9, 100), 100),
-        ("seconds", 50, (lengths - 1) / 50, np.median(lengths - 1) / 50),
-        ("seconds", rates, (lengths - 1) / rates, np.median((lengths - 1) / rates)),
+    tables, rates = [pd.DataFrame(x) for x in bunch.data], np.linspace(20, 100, 9)
+    for x in tables:
+        x.attrs["frame_rate"] = 20.0
+    for X, unit, rate, ends, last in (
+        (bunch.data, "frames", None, lengths - 1, P - 1),
+        (bunch.data, "percent", None, np.full(9, 100), 100),
+        (bunch.data, "seconds", 50, (lengths - 1) / 50, np.median(lengths - 1) / 50),
+        (bunch.data, "seconds", rates, (lengths - 1) / rates, np.median((lengths - 1) / rates)),
+        (tables, "seconds", None, (lengths - 1) / 20, np.median(lengths - 1) / 20),
     ):
         display = SynchronizationDisplay.from_estimator(
-            pipe, bunch.data, features=[0], unit=unit, frame_rate=rate
+            pipe, X, features=[0], unit=unit, frame_rate=rate
         )
         for path, n, end in zip(display.before_[0].get_paths(), lengths, ends, strict=True):
             np.testing.assert_allclose(path.vertices[:, 0], np.linspace(0, end, n))
@@ -136,33 +128,13 @@ def test_units_of_the_synchronization_display(bunch, pipe):
         np.testing.assert_allclose(display.pattern_[0].get_xdata(), clock)
         scale = {"frames": 1, "percent": 100 / (P - 1)}.get(unit, ends[:, None] / (P - 1))
         offsets = (times - np.arange(P)) * scale
-        for path, expected in zip(
-            display.offsets_.get_paths(), offsets - offsets.mean(axis=0), strict=True
-        ):
+        for path in display.offsets_.get_paths():
             np.testing.assert_allclose(path.vertices[:, 0], clock)
-            np.testing.assert_allclose(path.vertices[:, 1], expected, atol=1e-9)
+        np.testing.assert_allclose(ys(display.offsets_), offsets - offsets.mean(axis=0), atol=1e-9)
         labels = " ".join(axis.get_xlabel() for axis in display.axes_)
         assert {"frames": "frame of", "percent": "% of", "seconds": "(s)"}[unit] in labels
     with pytest.raises(ValueError, match=r"The frame rate of .* is not known"):
         SynchronizationDisplay.from_estimator(pipe, bunch.data, unit="seconds")
-
-
-def test_tables_tell_their_frame_rate(bunch, pipe):
-    tables = [pd.DataFrame(x) for x in bunch.data]
-    for k, x in enumerate(tables):
-        x.attrs["frame_rate"] = 25.0 + k
-    given = {"unit": "seconds", "features": [0]}
-    rates = [25.0 + k for k in range(len(tables))]
-    for display in (SynchronizationDisplay, ActionModelDisplay):
-        with pytest.warns(UserWarning, match="Trial 1 has 26 frames a second"):
-            told = display.from_estimator(pipe, tables, **given)
-        asked = display.from_estimator(pipe, bunch.data, frame_rate=rates, **given)
-        for one, other in zip(np.ravel(told.axes_), np.ravel(asked.axes_), strict=True):
-            assert one.get_xlim() == other.get_xlim()
-        plt.close("all")
-        pytest_warns = pytest.warns(UserWarning, match="Trial 1 has 27 frames a second")
-        with pytest_warns, pytest.raises(ValueError, match=r"The frame rate of .* is not known"):
-            display.from_estimator(pipe, [*tables[1:], bunch.data[0]], **given)
 
 
 # -- how sure the warps are ------------------------------------------------------------------
@@ -178,42 +150,34 @@ def is_dotted(lines):
     return [dashes is not None for _, dashes in lines.get_linestyle()]
 
 
-def band(clock, lower, upper):
-    """The corners of a band, closed."""
-    xs, ys = np.concatenate([clock, clock[::-1]]), np.concatenate([lower, upper[::-1]])
-    return np.column_stack([[*xs, xs[0]], [*ys, ys[0]]])
-
-
-def check_bands(display, match, *args):
-    """The intervals of a match, from the mean of the offsets."""
-    offsets, lower, upper = match.offsets_in(*(args or ["frames"]), coverage=0.9)
-    lower, upper = lower - offsets.mean(axis=0), upper - offsets.mean(axis=0)
-    bands = segments(display.intervals_)
-    assert len(bands) == len(lower)
-    for found, *bounds in zip(bands, lower, upper, strict=True):
-        np.testing.assert_allclose(found, band(display.pattern_[0].get_xdata(), *bounds))
-
-
 def test_bands_are_the_intervals_of_the_match_in_any_unit(bunch, pipe):
     match, given = Match.from_estimator(pipe, bunch.data), {"features": 0, "frame_rate": 50}
-    for unit in ("percent", "seconds"):
+    for unit in ("frames", "percent", "seconds"):
         display = SynchronizationDisplay.from_estimator(pipe, bunch.data, unit=unit, **given)
-        check_bands(display, match, unit, bunch.data, 50)
-    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0)
-    check_bands(display, match)
+        offsets, *bounds = match.offsets_in(unit, bunch.data, 50, coverage=0.9)
+        lower, upper = (bound - offsets.mean(axis=0) for bound in bounds)
+        clock = display.pattern_[0].get_xdata()
+        corners = np.array(segments(display.intervals_))
+        np.testing.assert_allclose(corners[:, :-1, 0], [[*clock, *clock[::-1]]] * 9)
+        np.testing.assert_allclose(corners[:, :P, 1], lower)
+        np.testing.assert_allclose(corners[:, P:-1, 1], upper[:, ::-1])
     assert display.axes_[-1].get_title().endswith("shaded: 90 % intervals")
     assert display.intervals_.get_zorder() < display.offsets_.get_zorder()
 
 
 def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
     X = [*bunch.data[:4], twice(bunch.data[4]), *bunch.data[5:]]
-    doubtful = Match.from_estimator(pipe, X).doubtful
-    assert doubtful.tolist() == [i == 4 for i in range(9)]
-    for groups in (None, GROUPS):
-        display = SynchronizationDisplay.from_estimator(pipe, X, features=[0], y=groups)
+    points = pipe[:2].transform(X)
+    match = pipe[2].match(points)
+    doubtful = [i == 4 for i in range(9)]
+    assert match.doubtful.tolist() == doubtful
+    # A match that is known already tells the same.
+    for estimator, trials, groups in ((pipe, X, None), (pipe, X, GROUPS), (match, points, None)):
+        display = SynchronizationDisplay.from_estimator(estimator, trials, features=[0], y=groups)
         for lines in (*display.before_, *display.after_, display.offsets_):
-            assert is_dotted(lines) == doubtful.tolist()
-        assert display.axes_[-1].get_title().endswith("; dotted: 1 doubtful trial")
+            assert is_dotted(lines) == doubtful
+        title = "offsets\nshaded: 90 % intervals; dotted: 1 doubtful trial"
+        assert display.axes_[-1].get_title() == title
         assert display.axes_[0].get_title() == "as recorded\n9 trials"
         colors = display.offsets_.get_colors()
         np.testing.assert_array_equal(display.intervals_.get_facecolor()[:, :3], colors[:, :3])
@@ -221,10 +185,10 @@ def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
     display = SynchronizationDisplay.from_estimator(pipe, X, features=0, warps=False)
     assert display.intervals_ is None
     assert display.axes_[0].get_title() == "as recorded\n9 trials, dotted: 1 doubtful trial"
-    assert is_dotted(display.before_[0]) == doubtful.tolist()
+    assert is_dotted(display.before_[0]) == doubtful
 
 
-def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
+def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch):
     X = [*bunch.data[:8], twice(bunch.data[8])]
     linear, marks = LinearSynchronizer(30).fit(X), {"keyframes": bunch.keyframes}
     by_marks = LinearSynchronizer(30).fit(bunch.data, **marks)
@@ -235,18 +199,6 @@ def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
         assert display.doubtful is display.intervals_ is None
         assert display.axes_[-1].get_title() == "offsets"
         assert not any(is_dotted(display.offsets_))
-
-
-def test_a_match_that_is_known_already_tells_intervals_and_doubtful_trials(bunch, pipe):
-    points = pipe[:2].transform([*bunch.data[:8], twice(bunch.data[8])])
-    match = pipe[2].match(points)
-    one = SynchronizationDisplay.from_estimator(match, points, features=0)
-    other = SynchronizationDisplay.from_estimator(pipe[2], points, features=0)
-    for found, expected in zip(segments(one.intervals_), segments(other.intervals_), strict=True):
-        np.testing.assert_array_equal(found, expected)
-    assert is_dotted(one.offsets_) == is_dotted(other.offsets_) == match.doubtful.tolist()
-    title = "offsets\nshaded: 90 % intervals; dotted: 1 doubtful trial"
-    assert one.axes_[-1].get_title() == other.axes_[-1].get_title() == title
 
 
 def test_many_bands_are_lighter_than_few(bunch, pipe):
