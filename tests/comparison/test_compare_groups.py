@@ -417,9 +417,7 @@ def test_a_difference_in_timing_is_called_timing(late):
     assert "they differ in timing (joint p = 0.0" in found.describe()
     assert found.n_units == 16
 
-
-def test_a_constant_signal_leaves_timing_what_it_is(late):
-    gait, _ = late
+    # A signal that is constant leaves it so.
     knee = [np.column_stack([x[:, 1], np.ones(len(x))]) for x in gait.data]
     sync = DenseSynchronizer(P).fit(knee)
     found = compare_groups(sync, knee, gait.group, groups=gait.person, n_permutations=199)
@@ -501,17 +499,16 @@ def test_sizes_are_in_the_units_of_the_trials(late, capsys):
 def test_names_and_chosen_features_of_tables():
     gait, _ = studied(8, timing=6)
     tables = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
-    sync = DenseSynchronizer(P).fit(tables)
-    found = compare_groups(
-        sync, tables, gait.group, groups=gait.person, features="knee_flexion", n_permutations=199
-    )
-    assert set(found.clusters["feature"]) <= {"knee_flexion", "offset"}
+    given = {"y": gait.group, "groups": gait.person, "n_permutations": 199, "level": 0.9}
     forces = [x[["vertical_force"]].iloc[::2] for x in tables]
-    other = compare_groups(
-        sync, tables, gait.group, groups=gait.person, signals=forces, n_permutations=199
-    )
-    assert set(other.clusters["feature"]) <= {"vertical_force", "offset"}
-    assert other.p_timing == found.p_timing
+    sync, p = DenseSynchronizer(P).fit(tables), []
+    for name, chosen in (
+        ("knee_flexion", {"features": "knee_flexion"}), ("vertical_force", {"signals": forces})
+    ):  # fmt: skip
+        found = compare_groups(sync, tables, **given, **chosen)
+        assert set(found.clusters["feature"]) == {name, "offset"}
+        p.append(found.p_timing)
+    assert p[0] == p[1]
 
 
 # -- refused ------------------------------------------------------------------------------
@@ -526,30 +523,18 @@ GROUPS = ["a", "b"] * 8
         ({"y": None}, "y is needed"),
         ({"y": [k + 0.5 for k in range(16)]}, "numbers such as 0.5, which are no labels"),
         ({"y": GROUPS, "groups": GROUPS}, "the same 2 sets of trials apart as y"),
-        (
-            {"y": ["a"] * 15 + ["b"]},
-            "At least two people a group are needed, got 15 in 'a', 1",
-        ),
+        ({"y": ["a"] * 15 + ["b"]}, "At least two people a group are needed, got 15 in 'a', 1"),
         ({"y": GROUPS, "groups": PAIRS}, "'p0' has trials of several labels in y. Set paired=True"),
-        (
-            {"y": GROUPS, "paired": True},
-            "needs two labels in y, got 2, and groups=, .* missing",
-        ),
+        ({"y": GROUPS, "paired": True}, "needs two labels in y, got 2, and groups=, .* missing"),
         (
             {"y": GROUPS[:15] + ["a"], "groups": PAIRS, "paired": True},
             "'p7' has no trial of 'b' in y",
         ),
-        (
-            {"y": range(16), "covariate": True, "paired": True},
-            "groups of trials, not a covariate",
-        ),
+        ({"y": range(16), "covariate": True, "paired": True}, "groups of trials, not a covariate"),
         ({"y": range(5), "covariate": True}, r"one number for each of 16 trials, got shape \(5,\)"),
         ({"y": [1.0] * 16, "covariate": True}, "must differ between trials"),
         ({"y": [np.nan] * 16, "covariate": True}, "must be finite"),
-        (
-            {"y": range(16), "covariate": True, "groups": [0, 1] * 8},
-            "At least 4 people are needed",
-        ),
+        ({"y": range(16), "covariate": True, "groups": [0, 1] * 8}, "At least 4 people are needed"),
         *(
             ({"y": GROUPS, "level": level}, "level must be a number between 0 and 1")
             for level in (0, 1, 1.5, True, "0.1")

@@ -51,17 +51,12 @@ def lab(color, seen_by):
 
 
 @pytest.mark.parametrize("seen_by", SEEN_BY)
-def test_colors_of_one_figure_differ(seen_by):
-    for one, other in TOGETHER:
-        apart = np.linalg.norm(lab(COLORS[one], seen_by) - lab(COLORS[other], seen_by))
-        assert apart > 20, (one, other)
-
-
-@pytest.mark.parametrize("seen_by", SEEN_BY)
-def test_colors_of_four_groups_differ(seen_by):
-    colors = [color for color, _ in group_styles("abcd").values()]
-    for one, other in itertools.combinations(colors, 2):
-        assert np.linalg.norm(lab(one, seen_by) - lab(other, seen_by)) > 15
+def test_colors_of_one_figure_and_of_four_groups_differ(seen_by):
+    groups = itertools.combinations([color for color, _ in group_styles("abcd").values()], 2)
+    pairs = [(COLORS[one], COLORS[other], 20) for one, other in TOGETHER]
+    for one, other, least in [*pairs, *((*pair, 15) for pair in groups)]:
+        apart = np.linalg.norm(lab(one, seen_by) - lab(other, seen_by))
+        assert apart > least, (one, other)
 
 
 def test_parts_outside_a_band_have_the_right_length():

@@ -34,6 +34,7 @@ def test_given_events_count():
     walk = make_walk(2, random_state=0)
     events = gait_events(walk.data, walk.skeleton, frame_rate=100)
     expected = gait_parameters(walk.data, walk.skeleton, frame_rate=100)
+    assert expected.loc[0].loc["stride length", "unit"] == "", "arrays tell none"
     for columns in (["label", "context", "frame"], ["label", "context", "time"]):
         found = gait_parameters(
             walk.data, walk.skeleton, events=events[["trial", *columns]], frame_rate=100
@@ -59,47 +60,9 @@ def test_given_events_count():
     assert times[0]["n"] == times[1]["n"] - 2
 
 
-def test_units():
-    walk = make_walk(1, random_state=0)
-    df = pd.DataFrame(1000 * walk.data[0], columns=walk.skeleton.column_names)
-    df.attrs |= {"frame_rate": 100.0, "units": "mm", "up": "y"}
-    table = gait_parameters(df).loc[0]
-    assert table.loc["stride length", "unit"] == "m"
-    assert table.loc["stride length", "mean"] == pytest.approx(walk.stride_length[0], rel=0.03)
-    assert table.loc["cadence", "unit"] == "steps/min"
-    bare = gait_parameters(walk.data, walk.skeleton, frame_rate=100).loc[0]
-    assert bare.loc["stride length", "unit"] == ""
-
-
-def test_no_strides():
-    """A body that stands has a table all the same."""
+def test_a_body_that_stands_has_a_table_all_the_same():
     walk = make_walk(1, random_state=0)
     still = np.repeat(walk.data[0][:1], 300, axis=0)
     table = gait_parameters([still], walk.skeleton, frame_rate=100).loc[0]
     assert (table["n"] == 0).all()
     assert table["mean"].isna().all()
-
-
-@pytest.mark.parametrize(
-    ("events", "message"),
-    [
-        (pd.DataFrame({"label": [], "time": []}), "events: there is no column 'context'"),
-        (pd.DataFrame({"label": [], "context": []}), "events: there is no column 'frame'"),
-        (
-            pd.DataFrame({"trial": [7], "label": ["Foot Off"], "context": ["Left"], "time": [1]}),
-            "events: recording 7 is not in X, whose labels are",
-        ),
-        (
-            pd.DataFrame({"label": ["Foot Off"], "context": ["Left"], "frame": [9999]}),
-            "events: Foot Off Left at frame 9999 is outside of trial 0",
-        ),
-        (
-            pd.DataFrame({"label": ["Foot Off"], "context": ["Left"], "time": [-1.5]}),
-            "events: Foot Off Left at time -1.5 is outside of trial 0",
-        ),
-    ],
-)
-def test_refused_events(events, message):
-    walk = make_walk(1, random_state=0)
-    with pytest.raises(ValueError, match=message):
-        gait_parameters(walk.data, walk.skeleton, events=events, frame_rate=100)

@@ -65,8 +65,13 @@ def test_events_of_a_table_go_to_their_recordings():
     for frame in (-0.51, 9.51):
         with pytest.raises(ValueError, match=rf"Foot Off left at frame {frame} is outside of"):
             recordings.split_events(events.head(1).assign(frame=frame))
-    with pytest.raises(ValueError, match="there is no column 'trial'"):
-        recordings.split_events(events.drop(columns="trial"))
+    with pytest.raises(ValueError, match=r"Foot Off left at time -0\.03 is outside of"):
+        recordings.split_events(seconds.head(1).assign(time=-0.03))
+    for name in ("trial", "context", "frame"):
+        with pytest.raises(ValueError, match=f"there is no column '{name}'"):
+            recordings.split_events(events.drop(columns=name))
+    with pytest.raises(ValueError, match=r"recording \('b', 7\) is not in X, whose labels are"):
+        recordings.split_events(events.head(1).assign(trial=7))
     one = Recordings(tables()[1:])
     assert one.split_events(events[:2].drop(columns="trial"))[0][1] == ("Foot Off", "left", 9.5)
 
