@@ -13,6 +13,13 @@ def ys(collection):
     return np.array([xy[:, 1] for xy in segments(collection)])
 
 
+def edges(area):
+    """The lower and the upper edge of an area between two curves, (2, n)."""
+    heights = area.get_paths()[0].vertices[1:-1, 1]
+    n = len(heights) // 2
+    return np.array([heights[:n], heights[n + 1 :][::-1]])
+
+
 def texts(axis):
     """The labels of the legend."""
     return [text.get_text() for text in axis.get_legend().get_texts()]

@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from artists import texts, ys
+from artists import edges, texts, ys
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, PartSynchronizer
 from sklearn_motionsync.datasets import make_bending
@@ -26,9 +26,8 @@ def test_curves_show_mean_interval_and_standard_deviation():
         np.testing.assert_array_equal(display.means_[i].get_ydata(), table["mean"])
         ends = [table["mean"] - table["sd"], table["mean"] + table["sd"]]
         np.testing.assert_allclose(ys(display.spreads_[i]), ends)
-        heights = display.intervals_[i].get_paths()[0].vertices[1:-1, 1]
-        np.testing.assert_allclose(heights[:21], table["low"])
-        np.testing.assert_allclose(heights[22:][::-1], table["high"])
+        bounds = table[["low", "high"]].T
+        np.testing.assert_allclose(edges(display.intervals_[i]), bounds)
         low, high = display.axes_[i].get_ylim()
         assert low == -high < -5
     icc = LAGS.summary()["icc"]

@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from artists import segments, texts, ys
+from artists import edges, segments, texts, ys
 from matplotlib.colors import to_rgba
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
@@ -23,9 +23,8 @@ def test_mean_envelope_and_trials(bunch, pipe):
     warped = pipe[:3].transform(bunch.data)
     for i, feature in enumerate([1, 0]):
         np.testing.assert_array_equal(display.mean_[i].get_ydata(), model.mean_[:, feature])
-        corners = display.envelope_[i].get_paths()[0].vertices[1:-1]
-        np.testing.assert_allclose(corners[:P], np.c_[range(P), lower[:, feature]])
-        np.testing.assert_allclose(corners[P + 1 :][::-1], np.c_[range(P), upper[:, feature]])
+        bounds = lower[:, feature], upper[:, feature]
+        np.testing.assert_allclose(edges(display.envelope_[i]), bounds)
         np.testing.assert_array_equal(ys(display.trials_[i]), warped[:, :, feature])
     assert {"mean ± 3 standard deviations", "9 trials"} < set(texts(display.axes_[0]))
 

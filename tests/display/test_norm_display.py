@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from artists import segments, texts
+from artists import edges, segments, texts
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.comparison import compare_to_norm
 from sklearn_motionsync.datasets import make_gait
@@ -30,9 +30,7 @@ def test_lines_and_bands_are_those_of_the_comparison(found):
         np.testing.assert_array_equal(display.subject_[k].get_ydata(), curve)
         np.testing.assert_array_equal(display.mean_[k].get_ydata(), mean)
         reach = found.limits[i, k] * found.std[:, k]
-        heights = display.bands_[k].get_paths()[0].vertices[1:-1, 1]
-        np.testing.assert_allclose(heights[:51], mean - reach)
-        np.testing.assert_allclose(heights[52:][::-1], mean + reach)
+        np.testing.assert_allclose(edges(display.bands_[k]), [mean - reach, mean + reach])
         # Violet where a row of the table is, and nowhere else.
         rows = found.departures[found.departures["subject"] == subject]
         rows = rows[rows["feature"] == found.features[k]]

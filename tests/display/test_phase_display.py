@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from artists import ends_of_bones, texts
+from artists import edges, ends_of_bones, texts
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending, make_gait
@@ -35,13 +35,9 @@ def test_artists_agree_with_the_estimator(live):
     for row, x, expected in zip(display.rows_, X[6:], live.track(X[6:]), strict=True):
         np.testing.assert_allclose(row.phase.get_xdata(), np.arange(FRAME + 1) / RATE)
         np.testing.assert_allclose(row.phase.get_ydata(), 100 * expected.phase[past] / last)
-        # One way along the lower bounds, and back along the upper ones.
-        areas = (row.confidence, 0 * expected.confidence, last * expected.confidence)
-        bands = (row.interval, expected.lower, expected.upper)
-        for area, lower, upper in (areas, bands):
-            heights = area.get_paths()[0].vertices[:, 1]
-            np.testing.assert_allclose(heights[1 : FRAME + 2], 100 * lower[past] / last)
-            np.testing.assert_allclose(heights[-2 : -FRAME - 3 : -1], 100 * upper[past] / last)
+        percent = np.stack([expected.lower, expected.upper])[:, past] * 100 / last
+        np.testing.assert_allclose(edges(row.interval), percent)
+        np.testing.assert_allclose(edges(row.confidence)[1], 100 * expected.confidence[past])
         share = expected.phase[FRAME] / last
         assert row.dial.share.get_text() == f"{100 * share:.0f} %"
         assert row.dial.passed.theta1 == pytest.approx(90 - 360 * share)

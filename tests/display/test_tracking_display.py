@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from artists import texts
+from artists import edges, texts
 from sklearn.base import clone
 from sklearn_motionsync import DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
@@ -39,10 +39,8 @@ def test_artists_agree_with_the_track_of_hidden_features(tracker):
         np.testing.assert_array_equal(display.truths_[i].get_ydata(), X[4][:, k])
         np.testing.assert_array_equal(display.observed_[i].get_ydata(), SEEN[:, k])
         half = 1.645 * np.sqrt(track.covariances[:, k, k])
-        heights = display.bands_[i].get_paths()[0].vertices[1:-1, 1]
-        low, high = heights[: len(times)], heights[len(times) + 1 :][::-1]
-        np.testing.assert_allclose(low, track.poses[:, k] - half)
-        np.testing.assert_allclose(high, track.poses[:, k] + half)
+        bounds = track.poses[:, k] - half, track.poses[:, k] + half
+        np.testing.assert_allclose(edges(display.bands_[i]), bounds)
     np.testing.assert_allclose(display.phase_.get_ydata(), 100 * track.phases / 23)
     np.testing.assert_array_equal(display.rate_.get_ydata(), track.rates)
     for spans in display.hidden_:

@@ -277,10 +277,8 @@ def parameters_by_hand(walk, events, leg):
             length, row = np.hypot.reduce(way), {}
             row["stride time"], row["stride length"] = stride / walk.rate, length * leg
             row["speed"] = row["stride length"] / row["stride time"]
-            row["stance time"], row["swing time"] = (
-                (off - first) / walk.rate,
-                (last - off) / walk.rate,
-            )
+            row["stance time"] = (off - first) / walk.rate
+            row["swing time"] = (last - off) / walk.rate
             row["stance"] = 100 * (off - first) / stride
             row["step time"] = (last - opposite) / walk.rate
             row["cadence"] = 60 / row["step time"]
@@ -310,11 +308,8 @@ def parameters_by_hand(walk, events, leg):
             for side in ("left", "right")
         )
         both = np.r_[left, right]
-        means = [x.mean() if len(x) else np.nan for x in (left, right)]
-        mean, spread = (
-            both.mean() if len(both) else np.nan,
-            both.std(ddof=1) if len(both) > 1 else np.nan,
-        )
+        *means, mean = (x.mean() if len(x) else np.nan for x in (left, right, both))
+        spread = both.std(ddof=1) if len(both) > 1 else np.nan
         middle = np.mean(means)
         asymmetry = 100 * (means[0] - means[1]) / middle if middle else np.nan
         table[name] = [*means, mean, spread, len(both), asymmetry]

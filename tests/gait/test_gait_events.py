@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 from sklearn_motionsync import DenseSynchronizer, Skeleton
 from sklearn_motionsync.datasets import make_walk
 from sklearn_motionsync.gait import gait_events
@@ -79,12 +80,8 @@ def test_side_view_from_a_camera(walk, ruler):
 def test_units_place_and_axes_do_not_matter(walk):
     (x,), skeleton = walk.data[:1], walk.skeleton
     expected = gait_events([x], skeleton, frame_rate=100)
-    points = 1000 * x.reshape(len(x), -1, 3)
-    angle = 2.0
-    turn = np.array(
-        [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
-    )
-    turned = points @ turn.T + [500, -200, 30]
+    turn = Rotation.from_euler("y", 2.0).as_matrix()
+    turned = 1000 * x.reshape(len(x), -1, 3) @ turn.T + [500, -200, 30]
     upright = Skeleton(skeleton.joints, skeleton.parents, dict(skeleton.landmarks), up="z")
     # x, y, z of "y up" are y, z, x of "z up".
     found = gait_events([turned[..., [2, 0, 1]].reshape(len(x), -1)], upright, frame_rate=100)
@@ -111,12 +108,9 @@ def test_names_of_markers():
         "left_ankle": "LANK", "right_ankle": "RANK", "left_heel": "LHEE", "right_heel": "RHEE",
         "left_toe": "LTOE", "right_toe": "RTOE",
     }  # fmt: skip
-    columns = {}
-    for name, marker in names.items():
-        for axis in "xyz":
-            at = made.skeleton.column_names.index(f"{name}_{axis}")
-            columns[f"Ann:{marker}_{axis}"] = made.data[0][:, at]
-    df = pd.DataFrame(columns)
+    columns = {f"{a}_{x}": f"Ann:{b}_{x}" for a, b in names.items() for x in "xyz"}
+    df = pd.DataFrame(made.data[0], columns=made.skeleton.column_names)
+    df = df[list(columns)].rename(columns=columns)
     df[["M1_x", "M1_y", "M1_z"]] = 0.0
     df.attrs |= {"frame_rate": 100.0, "up": "y"}
     found = gait_events(df)
@@ -191,11 +185,6 @@ def test_rate_and_noise_hardly_matter_on_people(ruler, real_data):
         ({"skeleton": None}, "Arrays do not name their joints: give a skeleton"),
         ({"feet": {"heel": "left_heel"}}, "feet: 'heel' is none of left_heel, left_toe"),
         ({"feet": {"left_heel": "LHEE"}}, "feet: 'left_heel' is at 'LHEE', which is no joint"),
-        (
-            {"frame_rate": 0.01},
-            "Trial 0 has a frame rate of 0.01; recordings of people have 1",
-        ),
-        ({"frame_rate": 1e5}, "Give frame_rate= in frames a second"),
         ({"X": [np.zeros((20, 57))]}, "Trial 0 has 20 frames at 100 a second; 0.25 s and 4"),
         ({"X": [np.zeros((50, 6))]}, "Trial 0 has 6 features a frame, but the skeleton's 19"),
     ],

@@ -17,16 +17,11 @@ def test_known_lengths_and_times(treadmill):
         assert own["stride length"] == pytest.approx(walk.stride_length[i], rel=0.03)
         assert own["step length"] == pytest.approx(walk.stride_length[i] / 2, rel=0.05)
         assert own["step width"] == pytest.approx(walk.step_width[i], abs=0.01)
-        times = {
-            context: np.array([
-                event["time"] for event in walk.events[i]
-                if (event["label"], event["context"]) == ("Foot Strike", context)
-            ])
-            for context in ("Left", "Right")
-        }  # fmt: skip
-        strides = np.concatenate([np.diff(t) for t in times.values()])
+        events = pd.DataFrame(walk.events[i])
+        strikes = events[events["label"] == "Foot Strike"].sort_values("time")
+        strides = strikes.groupby("context")["time"].diff()
         assert own["stride time"] == pytest.approx(strides.mean(), rel=0.01)
-        steps = np.diff(np.sort(np.concatenate(list(times.values()))))
+        steps = strikes["time"].diff()
         assert own["cadence"] == pytest.approx(60 / steps.mean(), rel=0.01)
 
 
