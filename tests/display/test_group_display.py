@@ -64,10 +64,9 @@ def test_means_and_bands_are_of_people_in_degrees(pipe, statistic):
         "hip_flexion (deg)",
         "knee_flexion (deg)",
     ]
+    words = {"sd": "standard deviation", "se": "standard error", "interval": "95 %"}
     title = display.axes_[0].get_legend().get_title().get_text()
-    assert {"sd": "standard deviation", "se": "standard error", "interval": "95 %"}[
-        statistic
-    ] in title.replace("\n", " ")
+    assert words[statistic] in title.replace("\n", " ")
     assert texts(display.axes_[0]) == ["A: 14 trials of 7 people", "B: 14 trials of 7 people"]
 
 

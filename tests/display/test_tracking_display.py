@@ -47,6 +47,9 @@ def test_artists_agree_with_the_track_of_hidden_features(tracker):
         (span,) = spans
         ends = span.get_window_extent().transformed(span.axes.transData.inverted()).intervalx
         np.testing.assert_allclose(ends, [7.5 / 30, 14.5 / 30])
+    # Phase and rate are shaded where any feature that is drawn was hidden.
+    display = TrackingDisplay.from_estimator(tracker, SEEN, features=[0, HIDDEN[0]])
+    assert [len(spans) for spans in display.hidden_] == [0, 1, 1, 1]
 
 
 def test_lost_intervals_and_chosen_features(tracker):

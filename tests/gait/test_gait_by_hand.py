@@ -122,9 +122,8 @@ def events_by_hand(walk):
         elif late and np.median(late) < 0.04:
             rise = walk.filtered(walk.toes[side][:, 1], 0.0175, 2)
             off, _ = delayed(walk, side, rise, moments, -0.09, 0.015, -0.16, 0.06)
-        rows = [("Foot Strike", side, k) for k in strikes[side]] + [
-            ("Foot Off", side, k) for k in off
-        ]
+        rows = [("Foot Strike", side, k) for k in strikes[side]]
+        rows += [("Foot Off", side, k) for k in off]
         for row in rows:
             k = round(row[2])
             if 0 <= k < len(heel) and np.isfinite(heel[k]).all():
@@ -268,10 +267,8 @@ def parameters_by_hand(walk, events, leg):
                 inside = [k for k in at(label, of) if first < k < last]
                 return inside[0] if len(inside) == 1 else np.nan
 
-            off, opposite, other_off = (
-                only(*which)
-                for which in (("Foot Off", side), ("Foot Strike", other), ("Foot Off", other))
-            )
+            off, other_off = only("Foot Off", side), only("Foot Off", other)
+            opposite = only("Foot Strike", other)
             stride, heel = last - first, walk.heels[side]
             way = ground(heel, last) - ground(heel, first) - belt * stride / walk.rate
             length, row = np.hypot.reduce(way), {}

@@ -35,9 +35,7 @@ def test_given_events_count():
             walk.data, walk.skeleton, events=events[["trial", *columns]], frame_rate=100
         )
         pd.testing.assert_frame_equal(found, expected)
-    unknown = pd.DataFrame(
-        {"trial": [0], "label": ["Foot Off"], "context": ["Left"], "time": [np.nan]}
-    )
+    unknown = events.head(1).assign(time=np.nan)
     found = gait_parameters(
         walk.data, walk.skeleton, events=pd.concat([events, unknown]).drop(columns="frame"),
         frame_rate=100,
