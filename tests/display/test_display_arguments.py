@@ -55,10 +55,6 @@ def with_one(x, value, at=(3, 1)):
     return x
 
 
-def masked(x):
-    return np.ma.array(x, mask=np.arange(np.size(x)).reshape(np.shape(x)) == 4)
-
-
 @pytest.fixture(scope="module")
 def pipe():
     steps = DirectionCosines(BUNCH.skeleton), ASpace(3), DenseSynchronizer(20), ActionModel()
@@ -129,7 +125,7 @@ def draw_positions(x=POSITIONS[0], skeleton=PAPER, **arguments):
         ({"x": "walk.bvh"}, "A set of trials"),
         ({"x": POSITIONS[0][:, :6]}, r"15 joints are \(n_frames, 45\)"),
         ({"x": POSITIONS[0][:0]}, r"shape \(0, 45\)"),
-        ({"x": [POSITIONS[0], masked(POSITIONS[1])]}, "Trial 1 has masked values"),
+        ({"x": [POSITIONS[0], np.ma.masked_greater(POSITIONS[1], 1)]}, "Trial 1 has masked values"),
         ({"x": with_one(POSITIONS[0], np.inf)}, "Trial 0, frame 3, feature 1 is infinity"),
         ({"x": POSITIONS[0] * np.nan}, "No frame shows the hips"),
         (

@@ -104,15 +104,17 @@ def test_events_are_lines_at_their_mean_place_with_the_spread_of_people(pipe):
     events = pd.DataFrame(GAIT.keyframes, columns=GAIT.keyframe_names)
     events.iloc[3, 2] = np.nan
     display = GroupDisplay.from_estimator(pipe, TRIALS, **GIVEN, events=events)
-    times = Match.from_estimator(pipe, TRIALS).times
+    match = Match.from_estimator(pipe, TRIALS)
     lengths = np.array([[len(x) - 1] for x in TRIALS])
     own = events.to_numpy() / lengths * (P - 1)
-    places = np.array([np.interp(o, t, np.arange(P)) for o, t in zip(own, times, strict=True)])
+    places = np.array([np.interp(o, t, range(P)) for o, t in zip(own, match.times, strict=True)])
     people = pd.DataFrame(places).groupby(list(GAIT.person), sort=False).mean()
     drawn = [line.get_xdata()[0] for line in display.events_[0]]
     np.testing.assert_allclose(drawn, people.mean() * 100 / (P - 1))
     np.testing.assert_allclose(np.sort(display.events.std()), np.sort(people.std()))
-    assert len(display.dots_[0].get_offsets()) == 7 * events.shape[1]
+    offsets = means_of_people(offsets_from_mean(match), "A")
+    expected = [np.interp(people.mean(), range(P), row) for row in offsets]
+    np.testing.assert_allclose(display.dots_[0].get_offsets()[:, 1], np.ravel(expected))
     # Key-frames that the match is given are events, too.
     aligned = DenseSynchronizer(P).fit(GAIT.data, keyframes=GAIT.keyframes)
     display = GroupDisplay.from_estimator(aligned, GAIT.data, keyframes=GAIT.keyframes)

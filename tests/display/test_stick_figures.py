@@ -228,6 +228,7 @@ def test_animation_plays_from_the_first_to_the_last_frame(bunch, pipe, monkeypat
     figure, axes = plt.subplots(2, 1)
     HTMLFormatter()(display.animate(axes, seconds=0.2, fps=5))
     assert display.axes_ == list(axes)
+    assert all(len(axis.collections) == 4 for axis in axes), "earlier bodies are still there"
     assert plt.fignum_exists(figure.number)
 
 
