@@ -26,6 +26,7 @@ from .base import Synchronizer
 from .dense import DenseSynchronizer
 from .match import STANDARD, UNITS, Match, check_match
 from .parts import PartSynchronizer
+from .training import with_confidence
 
 # The appended features: the offset, and its standard errors.
 _OFFSET, _ERROR = "offset", "offset_error"
@@ -251,7 +252,9 @@ class TimingChannel(
         check_is_fitted(self)
         trials = self.synchronizer_.check_trials(X)
         check_match(match, len(trials), self.n_frames_, type(self.synchronizer_).__name__)
-        curves = match.warp(trials)
+        # What was hidden in the match is hidden here, too.
+        hidden = None if match.reached is None else match.reached.trials.confidence
+        curves = match.warp(with_confidence(trials, hidden))
         lengths = [len(x) for x in trials]
         timing = [match.offsets_in(self.unit, lengths, self.frame_rate)]
         if self.errors:
