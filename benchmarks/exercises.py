@@ -1,13 +1,14 @@
 """Exercises done right and wrong: learnt from right trials of other people, one person left out.
 
-    python benchmarks/exercises.py DATA_FOLDER [right-or-wrong] [sides]
+    python benchmarks/exercises.py DATA_FOLDER [right-or-wrong] [patients] [sides]
 
 DATA_FOLDER holds uiprmd/uiprmd_odd_positions.npz: five exercises of ten people. Everything is
 learnt from the right trials with odd numbers of nine people and judges all trials of the tenth but
 the first three right ones, which are the reference where there is one. The baseline is the mean
 squared z of cosines after linear normalisation. All five exercises were looked at while the weights
-of the tests were chosen. *Sides*: trials of HDM05 and UTKinect, of people left out, mirrored, with
-the arms exchanged, and backwards. Prints Markdown.
+of the tests were chosen. *Patients*: four exercises of IntelliRehabDS (irds/), a fifth of people
+left out, learnt from 40 right trials of healthy people and patients. *Sides*: trials of HDM05 and
+UTKinect, of people left out, mirrored, with the arms exchanged, and backwards. Prints Markdown.
 """
 
 import warnings
@@ -146,6 +147,51 @@ def right_or_wrong(folder):
             print_row(f"{name}, {n_own} of the person" if n_own else name, cells)
 
 
+# -- healthy people and patients ----------------------------------------------------------
+
+# The right trials of this patient are those of the other arm.
+OTHER_ARM = "shoulder abduction left", "202"
+N_LEARNT, N_TESTED, N_FOLDS = 40, 120, 5
+
+
+def patients(folder):
+    """Of every exercise: the area under the curve, right ones accepted, wrong ones found."""
+    path = folder / "irds" / "irds_left_positions.npz"
+    with np.load(path) as file:
+        table = pd.DataFrame({k: file[k] for k in ("label", "actor", "correct", "patient")})
+    # Joints that were lost are zeros.
+    trials = [np.where(x == 0, np.nan, x) for x in load_trials(path).data]
+    turned = np.flatnonzero((table["label"] == OTHER_ARM[0]) & (table["actor"] == OTHER_ARM[1]))
+    skeleton = Skeleton.kinect_v2()
+    for i, x in zip(turned, mirror([trials[i] for i in turned], skeleton), strict=True):
+        trials[i] = np.asarray(x)
+    trials = DirectionCosines(skeleton, hidden="nan").fit_transform(trials)
+    print_head("IntelliRehabDS", ["area", "healthy accepted", "patients accepted", "found"])
+    judged = []
+    for name, rows in table.groupby("label"):
+        random_state, right = np.random.default_rng(0), rows["correct"].to_numpy(bool)
+        for fold in np.array_split(random_state.permutation(rows["actor"].unique()), N_FOLDS):
+            held = rows["actor"].isin(fold).to_numpy()
+            known, tested = rows.index[~held & right], rows.index[held]
+            known = np.sort(random_state.choice(known, min(N_LEARNT, len(known)), replace=False))
+            tested = np.sort(random_state.choice(tested, min(N_TESTED, len(tested)), replace=False))
+            scores = by_detector(
+                [trials[i] for i in known], table["actor"][known], [], [trials[i] for i in tested]
+            )
+            judged.append(table.loc[tested].assign(score=scores))
+        print_row(name, rates(pd.concat(judged[-N_FOLDS:])))
+    print_row("all", rates(pd.concat(judged)))
+
+
+def rates(judged):
+    """Cells of a row: the area under the curve, and shares in per cent."""
+    right, patient = (judged[k].astype(bool) for k in ("correct", "patient"))
+    accepted = judged["score"] <= 0
+    shares = accepted[right & ~patient], accepted[right & patient], ~accepted[~right]
+    area = roc_auc_score(~right, judged["score"])
+    return [f"{area:.3f}", *(f"{100 * share.mean():.0f}" for share in shares)]
+
+
 # -- the wrong side, and the way back -----------------------------------------------------
 
 
@@ -187,4 +233,5 @@ def sides(folder):
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    run_tables({"right-or-wrong": right_or_wrong, "sides": sides}, command_line(__doc__))
+    tables = {"right-or-wrong": right_or_wrong, "patients": patients, "sides": sides}
+    run_tables(tables, command_line(__doc__))
