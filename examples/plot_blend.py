@@ -9,7 +9,7 @@ fast, and each in an individual way. The blend has the mean of their timing and 
 import matplotlib.pyplot as plt
 import numpy as np
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, Match
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay
 from sklearn_motionsync.synchronizers import blend_trials
@@ -98,10 +98,10 @@ _ = axis.set_title(
 # %%
 # Where it fails
 # --------------
-# Without a skeleton, positions are averaged as numbers. These two people do not face the same way,
-# and the mean is no human body: its shoulders are too narrow.
+# A synchronizer of positions has no skeleton, and averages them as numbers. These two people do not
+# face the same way, and the mean is no human body: its shoulders are too narrow.
 
-numbers = blend_trials(Match.from_estimator(pipe, X), X, [0.5, 0.5])
+numbers = blend_trials(DenseSynchronizer().fit(X), X, [0.5, 0.5])
 figure, axis = plt.subplots(figsize=(6.4, 3.2), layout="constrained")
 for name, x, color in (
     ("slow", X[0], "#0072B2"),

@@ -8,6 +8,7 @@ force plates. The walks are made up, so the true events are known. Half of the p
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from sklearn_motionsync.datasets import make_walk
 from sklearn_motionsync.display import GaitDisplay
 from sklearn_motionsync.gait import gait_events, gait_parameters
@@ -22,9 +23,12 @@ skeleton, rate = even.skeleton, even.frame_rate
 # Strikes and foot-offs
 # ---------------------
 # Heels and toes are known by their names. Lines are strikes, dotted lines foot-offs. Where the bars
-# overlap, both feet are on the ground.
+# overlap, both feet are on the ground. A table tells the unit of its positions.
 
-display = GaitDisplay.from_positions(limping.data, skeleton, frame_rate=rate)
+columns = [f"{joint}_{axis}" for joint in skeleton.joints for axis in "xyz"]
+walk = pd.DataFrame(limping.data[0], columns=columns)
+walk.attrs["units"] = "m"
+display = GaitDisplay.from_positions([walk], skeleton, frame_rate=rate)
 _ = display.figure_.suptitle("A limp: the left foot strikes late")
 
 # %%

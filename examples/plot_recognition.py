@@ -145,12 +145,14 @@ judge(list(shown.values())).set_index(pd.Index(shown, name="trial"))
 # departs, with which limbs, and by how many standard deviations.
 
 lifted = shown["left arm lifted"]
-find_departures(pipe, [lifted]).head().round(1)
+most_like = judge([lifted])["most like"].iloc[0]
+of_class = make_pipeline(*pipe[:-1], *pipe[-1].model_of(most_like))
+find_departures(of_class, [lifted]).head().round(1)
 
 # %%
 # The same as stick figures. Violet limbs depart; the mean of the class is pale.
 
-display = SkeletonDisplay.from_departures(pipe, [lifted], frames=4)
+display = SkeletonDisplay.from_departures(of_class, [lifted], frames=4)
 _ = display.heading_.set_text(
     "Rejected, because the left arm is lifted (violet).\nPale: the mean of the class"
 )

@@ -3,6 +3,7 @@
 import re
 from functools import partial
 from numbers import Real
+from textwrap import fill
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from .arguments import as_frames, as_index
 _HEIGHT, _PELVIS = "pelvis_height", "hip"
 # A frame given by index represents the frames around it, up to this share of the clock.
 _FAR = 1 / 12
+# Characters beside each other above a body.
+_WIDTH_OF_TITLE = 18
 
 
 def limb_departures(rows, n_frames, frames, skeleton):
@@ -57,7 +60,7 @@ def limb_departures(rows, n_frames, frames, skeleton):
             # A panel has no room for more.
             text = describe_departure(departing[0])
             text = re.sub(r"moves (\S+) times as far", r"x \1", text)
-        titles.append(f"frame {frame}\n{text}")
+        titles.append(f"frame {frame}\n{fill(text, _WIDTH_OF_TITLE)}")
         limbs = dict.fromkeys(row.limb for row in departing)
         bones = [bone for limb in limbs for bone in _bones_of_limb(limb, skeleton)]
         # Each once.
