@@ -142,9 +142,9 @@ class Acceptance:
     people farthest from the others, if that is larger. Where patients are among the people, some
     right trials are far from all others, and the distribution alone has too near a limit: it
     accepts 72 to 77 % of the right trials of new patients, and with the two people 80 to 81 %
-    (IntelliRehabDS, four draws of the people left out; of healthy ones 98 %). The farthest one
-    alone, who may have been judged wrongly, makes it 84 to 87 %, and finds 69 % of exercises done
-    wrong where the two find 74 (UI-PRMD).
+    (IntelliRehabDS, four draws of the people left out; of healthy ones 98 %). With the
+    farthest one alone it would be 84 to 87 %, but then 69 % of exercises done wrong are found where
+    it is 74 now (UI-PRMD), and trials of one person may have been judged wrongly.
 
     Parameters
     ----------
