@@ -92,9 +92,7 @@ def pipeline():
 
 
 def by_model(known, groups, own, tested):
-    pipe = pipeline().fit(known, actionmodel__groups=groups)
-    reference = pipe[:-1].transform(own) if own else None
-    return -pipe[-1].decision_function(pipe[:-1].transform(tested), reference)
+    return -pipeline().fit(known, actionmodel__groups=groups).decision_function(tested)
 
 
 def by_detector(known, groups, own, tested):
@@ -139,6 +137,8 @@ def right_or_wrong(folder):
     ways = {"`ActionModel`": by_model, "`ActionDetector`": by_detector, "z, linear": by_z}
     for n_own in (0, 1, 2, 3):
         for name, way in ways.items():
+            if way is by_model and n_own:
+                continue
             found = np.array([judge(way, *rest, n_own) for _, *rest in exercises])
             mean = found.mean(axis=0)
             cells = [f"{x:.3f}" for x in (*found[:, 0], mean[0])]

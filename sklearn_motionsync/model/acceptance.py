@@ -138,13 +138,13 @@ class Acceptance:
 
     ``score^2 = - sum_k w_k log p_k``: Fisher's combination of the probabilities ``p_k`` of
     deviations as large, weighted, as tests differ in what they tell. The limit is the prediction
-    limit of the scores of training trials, by Student's t distribution, or the mean score of the two
-    people farthest from the others, if that is larger. Where patients are among the people, some
-    right trials are far from all others, and the distribution alone has too near a limit: it
+    limit of the scores of training trials, by Student's t distribution, or the mean score of the
+    two people farthest from the others, if that is larger. Where patients are among the people,
+    some right trials are far from all others, and the distribution alone has too near a limit: it
     accepts 72 to 77 % of the right trials of new patients, and with the two people 80 to 81 %
-    (IntelliRehabDS, four draws of the people left out; of healthy ones 98 %). With the
-    farthest one alone it would be 84 to 87 %, but then 69 % of exercises done wrong are found where
-    it is 74 now (UI-PRMD), and trials of one person may have been judged wrongly.
+    (IntelliRehabDS, four draws of the people left out; of healthy ones 98 %). With the farthest one
+    alone it would be 84 to 87 %, but then 69 % of exercises done wrong are found where it is 74 now
+    (UI-PRMD), and trials of one person may have been judged wrongly.
 
     Parameters
     ----------

@@ -27,13 +27,7 @@ from ..utils.groups import encode_groups, group_counts, refuse_classes_as_people
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .acceptance import LEAST, log_moments
-from .similarity import (
-    Neighbours,
-    PersonalReference,
-    TrialStream,
-    learn_weights,
-    warn_of_reference,
-)
+from .similarity import Neighbours, TrialStream, learn_weights
 from .variation import (
     clock_error,
     mean_band,
@@ -130,11 +124,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     4. For the threshold every training trial is compared with those of *other groups*. A trial of a
        new person stays below it with probability ``coverage``. Standing still is always above,
        unless no training trial moves.
-    5. With good trials of the person as ``reference``, the dissimilarity is that to the most
-       similar of them. Their mean is first moved towards that of all people, by the variances
-       within and between people. The threshold is that of training trials compared with as many
-       others of the same person, so some ``groups`` need several trials. The reference is aligned
-       as X is, by ``pipe[:-1].transform(own)``; `ActionDetector` takes it as it was recorded.
 
     **Gaps.** NaN is what was not seen, in training and after it. Mean and variances are those of
     what was seen at each frame, feature by feature; every value must have been seen in two groups.
@@ -371,64 +360,53 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             check_consistent_length(densities, sample_weight)
         return float(np.average(densities, weights=sample_weight))
 
-    def dissimilarity(self, X: TrialsLike, reference: TrialsLike | None = None) -> np.ndarray:
+    def dissimilarity(self, X: TrialsLike) -> np.ndarray:
         """Mean dissimilarity of trials to the three most similar training trials.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised trials.
-        reference : as X, default=None
-            Good trials of the person that X is of, two to five (note 5).
 
         Returns
         -------
         ndarray, shape (n_sequences,)
             0 for equal trials, 1 for standing still.
-
-        Raises
-        ------
-        ValueError
-            With a reference, if no group of the training set has two trials.
         """
         trials = self.check_trials(X)
-        return self._judge(reference).dissimilarity(trials)
+        return self._neighbours.dissimilarity(trials)
 
-    def decision_function(self, X: TrialsLike, reference: TrialsLike | None = None) -> np.ndarray:
+    def decision_function(self, X: TrialsLike) -> np.ndarray:
         """How far below the threshold the dissimilarity of trials is, as a logarithm.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised trials.
-        reference : as X, default=None
-            As for `dissimilarity`.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
             ``log(threshold / dissimilarity)``: negative for trials that are rejected.
         """
-        trials, judge = self.check_trials(X), self._judge(reference)
-        limit = self.threshold_ if reference is None else judge.limit(self.coverage)
-        return np.log(limit / np.maximum(judge.dissimilarity(trials), LEAST))
+        return np.log(self.threshold_ / np.maximum(self.dissimilarity(X), LEAST))
 
-    def predict(self, X: TrialsLike, reference: TrialsLike | None = None) -> np.ndarray:
-        """Whether trials are the action.
+    def predict(self, X: TrialsLike) -> np.ndarray:
+        """Whether trials are the action, by their movement alone.
+
+        An `ActionDetector` also looks at the pace and the size, and at good trials of the person.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised trials.
-        reference : as X, default=None
-            As for `dissimilarity`.
 
         Returns
         -------
         ndarray of int, shape (n_sequences,)
             1 if the dissimilarity is at most the threshold, else -1.
         """
-        return np.where(self.decision_function(X, reference) >= 0, 1, -1)
+        return np.where(self.decision_function(X) >= 0, 1, -1)
 
     # -- poses, bands and samples ----------------------------------------------------------
 
@@ -643,15 +621,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             "_log_moments": moments,
             "_stream": replace(stream, dropped=stream.dropped + log_moments(compared[~is_kept])),
         }
-
-    def _judge(self, reference):
-        """What dissimilarities are to: the training trials, or those of a person."""
-        if reference is None:
-            return self._neighbours
-        of_person = np.stack(self.check_trials(reference)).astype(np.float64)
-        warn_of_reference(self._neighbours.dissimilarity(of_person) > self.threshold_)
-        training, stream = self._stream.kept.astype(np.float64), self._stream
-        return PersonalReference(training, stream.groups, stream.mean, of_person)
 
     def _describe_unseen(self, stream):
         """A text about a value that the trials of fewer than two groups show; or none."""

@@ -124,8 +124,9 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
 
     Each gives the probability p of a deviation as large. Their score is
     ``sqrt(- log p_movement - 0.15 (log p_course + log p_duration + log p_energy))``, Fisher's
-    combination with weights. Its limit is learnt from the scores of trials of people left out. A
-    trial is also refused if one test alone is one and a half times beyond its limit.
+    combination with weights. Its limit is learnt from the scores of trials of people left out, and
+    reaches the two people who are farthest from the others. A trial is also refused if one test
+    alone is one and a half times beyond its limit.
 
     Where the movement clearly differs from an image of itself, a trial that is more like the image
     is refused: **mirror** (left and right exchanged), **arms** (only the arms exchanged) and
@@ -134,8 +135,9 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
     differences. It counts if its mean is at least twice its standard deviation.
 
     With good trials of the person as ``reference``, **own** is one more test: the dissimilarity to
-    the most similar of them, as in note 5 of `ActionModel`. It has weight 1 then, and all others
-    0.15.
+    the most similar of them. Their mean is first moved towards that of all people, by the variances
+    within and between people. The limit is that of training trials compared with as many others of
+    the same person, so some ``groups`` need several trials. It has weight 1, and all others 0.15.
 
     Give ``groups``, such as subjects, whenever people come more than once: acceptance regions
     are then those of differences between people. Variation between people is accepted: copies

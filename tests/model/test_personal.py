@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ActionDetector, ActionModel, ASpace, DenseSynchronizer, Match
 from sklearn_motionsync.model.similarity import PersonalReference
@@ -40,8 +39,8 @@ def slow_factors(X, groups, m):
 
 @pytest.mark.parametrize("m", [1, 3])
 def test_dissimilarity_and_threshold_equal_slow_loops(m):
-    model = ActionModel(coverage=0.9).fit(X, groups=GROUPS)
     own, new = NEW[PERSONS == 2][:m], NEW[PERSONS == 2][m:]
+    person = PersonalReference(X, GROUPS, X.mean(axis=0), own)
     weights, factors = slow_weights(X, GROUPS, within=True), slow_factors(X, GROUPS, m)
 
     def moved(some, mean):
@@ -51,38 +50,31 @@ def test_dissimilarity_and_threshold_equal_slow_loops(m):
         return min(slow_ratio(y, z, weights) for z in moved(some, mean))
 
     expected = [nearest(y, own, X.mean(axis=0)) for y in new]
-    np.testing.assert_allclose(model.dissimilarity(new, reference=own), expected, rtol=1e-9)
+    np.testing.assert_allclose(person.dissimilarity(new), expected, rtol=1e-9)
     left = []
     for i, y in enumerate(X):
         others = [5 * (i // 5) + (i + k) % 5 for k in range(1, m + 1)]
         left.append(nearest(y, X[others], X[GROUPS[i] != GROUPS].mean(axis=0)))
-    limit = slow_threshold(left, 0.9)
-    decisions = model.decision_function(new, reference=own)
-    np.testing.assert_allclose(decisions, np.log(limit / np.array(expected)), atol=1e-8)
-    signs = np.where(decisions >= 0, 1, -1)
-    np.testing.assert_array_equal(model.predict(new, reference=own), signs)
-    # None is as without the parameter.
-    np.testing.assert_array_equal(model.dissimilarity(new, None), model.dissimilarity(new))
+    np.testing.assert_allclose(person.limit(0.9), slow_threshold(left, 0.9), rtol=1e-8)
 
 
 def test_gaps_and_other_trials_change_nothing_else():
-    model, own = ActionModel().fit(X, groups=GROUPS), NEW[PERSONS == 1].copy()
-    together = model.dissimilarity(own[3:], reference=own[:3])
+    own = NEW[PERSONS == 1].copy()
+    person = PersonalReference(X, GROUPS, X.mean(axis=0), own[:3])
+    together = person.dissimilarity(own[3:])
     for y, value in zip(own[3:], together, strict=True):
-        assert model.dissimilarity([y], reference=own[:3])[0] == value
+        assert person.dissimilarity(y[np.newaxis])[0] == value
     own[0, 10:12, 1] = np.nan
-    gappy = model.dissimilarity(own[3:], reference=own[:3])
-    np.testing.assert_allclose(gappy, together, rtol=0.2)
+    gappy = PersonalReference(X, GROUPS, X.mean(axis=0), own[:3])
+    np.testing.assert_allclose(gappy.dissimilarity(own[3:]), together, rtol=0.2)
 
 
 def test_a_reference_needs_people_who_come_twice():
-    model = ActionModel().fit(X[::5], groups=GROUPS[::5])
-    for ask in (model.predict, model.dissimilarity, model.decision_function):
+    pipe = make_pipeline(DenseSynchronizer(30), ActionModel())
+    detector = ActionDetector(pipe).fit(raw(X[::5]), groups=GROUPS[::5])
+    for ask in (detector.predict, detector.report, detector.decision_function):
         with pytest.raises(ValueError, match="no group of the training set has two trials"):
-            ask(X, reference=NEW[:2])
-    found = ActionModel().fit(X, groups=GROUPS)
-    with pytest.raises(ValueError, match="The trials have 7 frames, the model 40"):
-        found.predict(X, reference=NEW[:2, :7])
+            ask(raw(X), reference=raw(NEW[:2]))
 
 
 def test_people_with_one_trial_are_left_out_of_the_limit():
@@ -117,12 +109,13 @@ def test_a_detector_takes_a_reference_as_it_was_recorded():
     assert report["reason"][5:].str.contains("unlike the reference").all()
     predicted = detector.predict(new, reference=good)
     np.testing.assert_array_equal(predicted, np.where(report["reason"] == "", 1, -1))
-    # The statistic is that of a model of the poses, with the limit of its share.
+    # The statistic is that of the poses, with the limit of its share.
     curves, own, warped = (
         Match.from_estimator(detector.estimator_, some).warp(some) for some in (raw(X), good, new)
     )
-    model = ActionModel(coverage=1 - 0.05 / 4).fit(curves, groups=GROUPS)
-    unlike = np.exp(-model.decision_function(warped, reference=own))
+    curves, own, warped = map(np.stack, (curves, own, warped))
+    person = PersonalReference(curves, GROUPS, curves.mean(axis=0), own)
+    unlike = person.dissimilarity(warped) / person.limit(1 - 0.05 / 4)
     np.testing.assert_allclose(report["own"], unlike, rtol=1e-8)
 
 
@@ -143,12 +136,11 @@ def test_exercises_of_people_done_right_and_wrong(benchmark, real_data):
         return [poses[i] for i in rows]
 
     pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(40), ActionModel())
-    pipe.fit(trials(train), actionmodel__groups=people[train])
-    steps, model = pipe[:-1], pipe[-1]
-    wrong, new = ~correct[rest], steps.transform(trials(rest))
-    by_others = roc_auc_score(wrong, model.dissimilarity(new))
-    by_own = roc_auc_score(wrong, model.dissimilarity(new, steps.transform(trials(right))))
-    assert by_own > max(by_others, 0.95)
     detector = ActionDetector(pipe).fit(trials(train), groups=people[train])
-    scores = -detector.decision_function(trials(rest), reference=trials(right))
-    assert roc_auc_score(wrong, scores) > 0.95
+    accepted_by = [
+        detector.predict(trials(rest), reference) == 1 for reference in (None, trials(right))
+    ]
+    is_right = correct[rest]
+    assert all(accepted[is_right].all() for accepted in accepted_by)
+    of_others, of_own = (accepted[~is_right].mean() for accepted in accepted_by)
+    assert of_own < 0.3 < of_others
