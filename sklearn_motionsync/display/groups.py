@@ -260,6 +260,11 @@ class GroupDisplay(Display):
         display.pairs = groups is not None and of_people.are_pairs
         return display.plot(ax)
 
+    @property
+    def offsets(self) -> list[np.ndarray]:
+        """For each group the offsets of its people from the mean of all trials, (n_people, P)."""
+        return [group.offsets for group in self.groups]
+
     def _layout(self):
         more = 0.6 + 0.2 * max(len(self.groups) - 2, 0) + 0.5 * (self.events is not None)
         return signal_layout(len(self.ylabels), more)

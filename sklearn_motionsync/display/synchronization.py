@@ -189,6 +189,11 @@ class SynchronizationDisplay(Display):
         """Which trials are doubtful; None if the match does not tell."""
         return None if self.match.intervals is None else self.match.doubtful
 
+    @property
+    def times(self) -> np.ndarray:
+        """The times of the match, (n_sequences, P), in frames."""
+        return self.match.times
+
     def _layout(self):
         n_rows = len(self.ylabels)
         cells = [(row, column) for row in range(n_rows) for column in (0, 1)]
