@@ -35,6 +35,7 @@ from harness import (
     read_unseen,
     run_tables,
     show_pair,
+    version_of,
 )
 from joblib import Parallel, delayed
 from sklearn_motionsync import (
@@ -176,8 +177,8 @@ def peer_table(folder):
     people, sets = read_people(folder), read_unseen(folder / "events44" / "events44.npz")
     columns = [TIME_LINE, "spread there", "46 moments nothing was chosen on", "spread there"]
     print_head("other packages", columns)
-    for label in peers.TIME_LINES:
-        if peers.installed(label) is None:
+    for label, (package, *_) in peers.TIME_LINES.items():
+        if version_of(package) is None:
             print(f"{label} is not installed", file=sys.stderr)
             continue
         for text, kind, align in peers.settings(label):
@@ -189,15 +190,12 @@ def peer_table(folder):
 
 
 def fed(align, kind, X):
-    return align(peer_features(X, kind))
-
-
-def peer_features(X, kind):
+    """What a peer makes of the features that it is fed."""
     on_clock = LinearSynchronizer(P).fit_transform(X)
     on_clock = on_clock - on_clock.mean(axis=(0, 1))
     if kind == "velocity":
-        return cost_features(on_clock, "velocity")
-    return smooth(on_clock, SMOOTHING * (P - 1)) if kind == "smoothed" else on_clock
+        return align(cost_features(on_clock, "velocity"))
+    return align(smooth(on_clock, SMOOTHING * (P - 1)) if kind == "smoothed" else on_clock)
 
 
 # -- true key-frames --------------------------------------------------------------------

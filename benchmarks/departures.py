@@ -182,7 +182,7 @@ def as_bodies(data, skeleton):
 
 
 class Fold(NamedTuple):
-    """Right trials of others and their subjects; the reference, the tested ones, faults of each."""
+    """Right trials of others and their subjects; the reference, the tested ones, their faults."""
 
     training: list
     groups: np.ndarray
@@ -191,19 +191,18 @@ class Fold(NamedTuple):
     faults: list
 
 
-def folds(trials, seed=0, n_reference=3):
-    """A fold of each subject with more trials than the reference takes."""
+def folds(trials):
+    """A fold of each subject with more trials than the three of the reference."""
     for number, actor in enumerate(np.unique(trials.actors)):
         own = np.flatnonzero(trials.actors == actor)
-        if len(own) <= n_reference:
+        if len(own) <= 3:
             continue
         others = np.flatnonzero((trials.actors != actor) & (trials.takes % 2 == 1))
-        reference, tested = own[:n_reference], own[n_reference:]
-        rng = np.random.default_rng([seed, number])
-        faults = [
-            {name: put_fault(trials.data[i], name, rng) for name in KINDS} for i in tested[:SPOILT]
-        ]
+        reference, tested = own[:3], own[3:]
+        rng = np.random.default_rng([0, number])
         some = lambda rows: [trials.data[i] for i in rows]  # noqa: E731
+        faults = [put_fault(x, name, rng) for x in some(tested[:SPOILT]) for name in KINDS]
+        faults = [fault for fault in faults if fault is not None]
         yield Fold(some(others), trials.actors[others], some(reference), some(tested), faults)
 
 
@@ -213,7 +212,6 @@ def folds(trials, seed=0, n_reference=3):
 class Said(NamedTuple):
     """Of a trial with a fault, or without one (``kind`` is then None)."""
 
-    name: str
     kind: str | None
     region: bool = False
     limb: bool = False
@@ -224,21 +222,20 @@ class Said(NamedTuple):
 
 def departures_of(fold, pipe, reference, limit=0.1):
     """What `find_departures` says first, whatever the evidence."""
-    pairs = [(name, fault) for faults in fold.faults for name, fault in faults.items() if fault]
-    trials = [fault.trial for _, fault in pairs]
+    trials = [fault.trial for fault in fold.faults]
     given = {"reference": reference} if reference else {}
     tables = [find_departures(pipe, X, limit=limit, **given) for X in (trials, fold.tested)]
     firsts = tables[0].groupby("trial").head(1).set_index("trial")
     rare = [set(table.loc[table["rare"], "trial"]) for table in tables]
     times = Match.from_estimator(pipe, trials).times / (P - 1)
-    said = [Said("untouched", None, rare=i in rare[1]) for i in range(len(fold.tested))]
-    for i, (name, fault) in enumerate(pairs):
+    said = [Said(None, rare=i in rare[1]) for i in range(len(fold.tested))]
+    for i, fault in enumerate(fold.faults):
         if i not in firsts.index:
-            said.append(Said(name, fault.kind, rare=i in rare[0]))
+            said.append(Said(fault.kind, rare=i in rare[0]))
             continue
         row = firsts.loc[i]
         found = row["limb"], times[i][row["first"]], times[i][row["last"]]
-        said.append(judged(name, fault, *found, row["kind"], i in rare[0]))
+        said.append(judged(fault, *found, row["kind"], i in rare[0]))
     return said
 
 
@@ -248,22 +245,21 @@ def plain_scores(fold):
     synchronised = linear.fit(cosines.transform(fold.training)).transform
     model = ActionModel().fit(synchronised(cosines.transform(fold.training)), groups=fold.groups)
     names = cosines.get_feature_names_out()[1:]
-    pairs = [(name, fault) for faults in fold.faults for name, fault in faults.items() if fault]
-    curves = synchronised(cosines.transform([fault.trial for _, fault in pairs]))
+    curves = synchronised(cosines.transform([fault.trial for fault in fold.faults]))
     said = []
     scores = (curves - model.mean_) / np.sqrt(model.predictive_variance_)
-    for (name, fault), z in zip(pairs, scores, strict=True):
+    for fault, z in zip(fold.faults, scores, strict=True):
         z = np.abs(z[:, 1:])
         peak, feature = np.unravel_index(z.argmax(), z.shape)
         within = z[:, feature] > 3
         first = peak - np.argmin(np.append(within[:peak][::-1], False))
         last = peak + np.argmin(np.append(within[peak + 1 :], False))
         limb = names[feature].rpartition("_")[0]
-        said.append(judged(name, fault, limb, first / (P - 1), last / (P - 1), "angle", False))
+        said.append(judged(fault, limb, first / (P - 1), last / (P - 1), "angle", False))
     return said
 
 
-def judged(name, fault, limb, start, stop, told, is_rare):
+def judged(fault, limb, start, stop, told, is_rare):
     """What is said of a trial, beside the truth."""
     regions = {limb: region for limb, (*_, region) in LIMBS.items()}
     regions |= dict.fromkeys(("hip", "shoulder", "neck", "pelvis_height"), "trunk")
@@ -274,7 +270,7 @@ def judged(name, fault, limb, start, stop, told, is_rare):
         both = max(0, min(stop, fault.stop) - max(start, fault.start))
         overlap = both / (max(stop, fault.stop) - min(start, fault.start))
     is_limb = limb == fault.limb
-    return Said(name, fault.kind, is_region, is_limb, overlap, told, is_rare)
+    return Said(fault.kind, is_region, is_limb, overlap, told, is_rare)
 
 
 def measure(classes):

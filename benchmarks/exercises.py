@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from harness import command_line, print_head, print_row, run_tables
+from harness import command_line, percent, print_head, print_row, run_tables
 from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -59,20 +59,21 @@ OTHER_SIDE = {
 
 def read_positions(folder):
     """Markers, the table of trials, and the skeleton; those of the other side are mirrored."""
-    with np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz") as file:
-        archive = dict(file)
-    skeleton = Skeleton(
-        archive["joints"].tolist(), archive["parents"].tolist(), landmarks=LANDMARKS, up="z"
-    )
-    x = archive["positions"].reshape(len(archive["positions"]), -1).astype(float)
-    trials = np.split(x, archive["offsets"][1:-1])
-    columns = ("label", "actor", "correct", "take")
-    table = pd.DataFrame({name: archive[name] for name in columns})
+    path = Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz"
+    bunch = load_trials(path)
+    skeleton = Skeleton(bunch.joints, bunch.skeleton.parents, LANDMARKS, up="z")
+    with np.load(path) as file:
+        table = pd.DataFrame({k: file[k] for k in ("label", "actor", "correct", "take")})
+    trials = [x.astype(float) for x in bunch.data]
+    return turned(trials, table, OTHER_SIDE, skeleton), table, skeleton
+
+
+def turned(trials, table, other_side, skeleton):
+    """Trials, of which those of people who use the other side are mirrored."""
     pairs = zip(table["label"], table["actor"], strict=True)
-    other = [i for i, (name, actor) in enumerate(pairs) if actor in OTHER_SIDE.get(name, ())]
-    for i, turned in zip(other, mirror([trials[i] for i in other], skeleton), strict=True):
-        trials[i] = np.asarray(turned)
-    return trials, table, skeleton
+    is_other = [actor in other_side.get(name, ()) for name, actor in pairs]
+    images = iter(mirror([x for x, k in zip(trials, is_other, strict=True) if k], skeleton))
+    return [next(images) if k else x for x, k in zip(trials, is_other, strict=True)]
 
 
 def read_exercises(folder):
@@ -150,7 +151,7 @@ def right_or_wrong(folder):
 # -- healthy people and patients ----------------------------------------------------------
 
 # The right trials of this patient are those of the other arm.
-OTHER_ARM = "shoulder abduction left", "202"
+OTHER_ARM = {"shoulder abduction left": ("202",)}
 N_LEARNT, N_TESTED, N_FOLDS = 40, 120, 5
 
 
@@ -161,10 +162,8 @@ def patients(folder):
         table = pd.DataFrame({k: file[k] for k in ("label", "actor", "correct", "patient")})
     # Joints that were lost are zeros.
     trials = [np.where(x == 0, np.nan, x) for x in load_trials(path).data]
-    turned = np.flatnonzero((table["label"] == OTHER_ARM[0]) & (table["actor"] == OTHER_ARM[1]))
     skeleton = Skeleton.kinect_v2()
-    for i, x in zip(turned, mirror([trials[i] for i in turned], skeleton), strict=True):
-        trials[i] = np.asarray(x)
+    trials = turned(trials, table, OTHER_ARM, skeleton)
     trials = DirectionCosines(skeleton, hidden="nan").fit_transform(trials)
     print_head("IntelliRehabDS", ["area", "healthy accepted", "patients accepted", "found"])
     judged = []
@@ -200,28 +199,26 @@ def exchange(columns, signs):
 
 
 def wrong_sides(clips, names):
-    """Of every action: right ones accepted, their images and other actions refused."""
+    """Of every action: right ones accepted, their images refused."""
     arms = PARTS["left arm"] + PARTS["right arm"]
     images = {
         "mirrored": exchange(*exchange_of_sides(names)),
         "arms exchanged": exchange(*exchange_of_sides(names, arms)),
         BACKWARDS: SPOILT[BACKWARDS],
     }
-    print_head(f"{clips.name}: accepted / refused", ["right", *images, "other actions", "images"])
+    print_head(f"{clips.name}: accepted / refused", ["right", *images])
     for action in dict.fromkeys(clips.actions):
-        shares, found = {}, set()
+        shares = {}
         for actor in dict.fromkeys(clips.actors[clips.actions == action]):
             is_it, is_held = clips.actions == action, clips.actors == actor
             detector = ActionDetector(pipeline())
             detector.fit(clips.some(is_it & ~is_held), groups=clips.actors[is_it & ~is_held])
-            own, found = clips.some(is_it & is_held), found | set(detector.images_)
+            own = clips.some(is_it & is_held)
             tried = {"right": own, **{k: [image(x) for x in own] for k, image in images.items()}}
-            tried["other"] = clips.some(~is_it & is_held)
             for name, some in tried.items():
                 accepted = detector.predict(some) == 1
                 shares.setdefault(name, []).extend(accepted if name == "right" else ~accepted)
-        cells = [f"{100 * np.mean(of_kind):.0f}" for of_kind in shares.values()]
-        print_row(f"`{action}`", [*cells, ", ".join(sorted(found)) or "none"])
+        print_row(f"`{action}`", [percent(np.mean(of_kind)) for of_kind in shares.values()])
 
 
 def sides(folder):

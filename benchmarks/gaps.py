@@ -115,15 +115,6 @@ def to_cosines(action, positions):
     return DirectionCosines(action.skeleton, hidden="nan").fit_transform(positions)
 
 
-# -- warps ------------------------------------------------------------------------------------
-
-
-def dense(X, patterns):
-    """Warps of all clips to every pattern."""
-    syncs = (DenseSynchronizer(P, pattern=int(n)).fit(X) for n in patterns)
-    return np.array([sync.match(X).times for sync in syncs])
-
-
 # -- the table --------------------------------------------------------------------------------
 
 
@@ -135,7 +126,8 @@ def compare(people, actions, kind, seed, ways=WAYS):
         cosines = to_cosines(action, positions)
         for name, way in ways.items():
             X = way(cosines, action, positions)
-            errors = Judged(one, dense(X, one.patterns)).errors()
+            syncs = [DenseSynchronizer(P, pattern=int(n)).fit(X) for n in one.patterns]
+            errors = Judged(one, [sync.match(X).times for sync in syncs]).errors()
             found.setdefault(name, {}).update(figures(errors))
     return {name: geometric_means(of_events) for name, of_events in found.items()}
 

@@ -177,13 +177,13 @@ def body_curve(positions, part):
     if part == "low hand":
         return np.minimum(positions["right hand"][:, 1], positions["left hand"][:, 1])
     if part == "step":
-        return _ahead(positions, positions["right ankle"] - positions["left ankle"])
+        return ahead(positions, positions["right ankle"] - positions["left ankle"])
     if part == "reach":
-        return _ahead(positions, positions["right hand"] - positions["pelvis"])
+        return ahead(positions, positions["right hand"] - positions["pelvis"])
     return positions[part][:, 1]
 
 
-def _ahead(positions, vectors):
+def ahead(positions, vectors):
     """The part of vectors that points where the hips face."""
     across = positions["left hip"] - positions["right hip"]
     facing = np.cross(across, [0.0, 1.0, 0.0])
@@ -242,14 +242,22 @@ def read_actions(folder, events=EVENTS):
     return actions
 
 
-def read_archive(folder, archive):
-    """The clips of an archive that have eight frames at least; takes of walking cut into cycles."""
+def read_takes(folder, archive, label=None):
+    """The takes of an archive, or of one action, that have eight frames at least."""
     bunch = load_trials(Path(folder) / archive / f"{archive}_positions.npz")
-    if archive == "cmu07_walk":
-        bunch = _cut_into_cycles(bunch, _joints_of_parts(bunch, archive))
-    chosen = [i for i, x in enumerate(bunch.data) if len(x) >= LEAST_LENGTH]
+    is_chosen = np.array([len(x) >= LEAST_LENGTH for x in bunch.data])
+    chosen = np.flatnonzero(is_chosen & (True if label is None else bunch.target == label))
     bunch.data = [bunch.data[i] for i in chosen]
-    bunch.target, bunch.actor = np.asarray(bunch.target)[chosen], np.asarray(bunch.actor)[chosen]
+    for name in ("target", "actor", "frame_rate"):
+        bunch[name] = bunch[name][chosen]
+    return bunch
+
+
+def read_archive(folder, archive):
+    """The takes of an archive; those of walking are cut into cycles."""
+    bunch = read_takes(folder, archive)
+    if archive == "cmu07_walk":
+        return _cut_into_cycles(bunch, _joints_of_parts(bunch, archive))
     return bunch
 
 
@@ -405,15 +413,9 @@ def fewer_clips(folder, events, n_clips):
     """One action with only some of its clips, taken evenly from their list."""
     (action,) = read_actions(folder, events)
     kept = np.unique(np.linspace(0, len(action.data) - 1, n_clips).astype(int))
-    few = Action(
-        archive=action.archive,
-        name=f"{action.name}, {n_clips} clips",
-        data=[action.data[i] for i in kept],
-        actors=action.actors[kept],
-        skeleton=action.skeleton,
-        moments={name: at[kept] for name, at in action.moments.items()},
-    )
-    return People(few)
+    few = {"data": [action.data[i] for i in kept], "actors": action.actors[kept]}
+    few["moments"] = {name: at[kept] for name, at in action.moments.items()}
+    return People(action._replace(name=f"{action.name}, {n_clips} clips", **few))
 
 
 def figures(errors):

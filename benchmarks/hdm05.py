@@ -4,9 +4,9 @@
 
 FOLDER holds, at any depth, the cut clips of HDM05 (``HDM_<actor>_<action>_<number>_120.amc``) and
 the skeletons of its actors (``HDM_<actor>.asf``), from https://resources.mpi-inf.mpg.de/HDM05/. The
-six actions and four actors of docs/accuracy.md are taken, 132 clips; ``--actions`` and ``--actors``
-choose others. The archive is what `load_trials` describes, and the names of the files, in
-metres, y upwards, float32; it is a derivative under the licence of HDM05, CC BY-SA 3.0.
+six actions and four actors of docs/accuracy.md are taken, 132 clips. The archive is what
+`load_trials` describes, and the names of the files, in metres, y upwards, float32; it is a
+derivative under the licence of HDM05, CC BY-SA 3.0.
 """
 
 import argparse
@@ -29,12 +29,12 @@ ACTORS = ("bd", "bk", "dg", "tr")
 NAME = re.compile(r"HDM_(?P<actor>[a-z]+)_(?P<label>\w+)_(?P<take>\d+)_(?P<fps>\d+)", re.ASCII)
 
 
-def find_clips(folder, actions=ACTIONS, actors=ACTORS):
-    """The clips of actions and actors below a folder, by action and name, and what these say."""
+def find_clips(folder):
+    """The clips below a folder, by action and name, and what these say."""
     found = {}
     for path in sorted(Path(folder).rglob("*")):
         clip = NAME.fullmatch(path.stem) if path.suffix.lower() == ".amc" else None
-        if clip and clip["label"] in actions and clip["actor"] in actors:
+        if clip and clip["label"] in ACTIONS and clip["actor"] in ACTORS:
             # The same clip may lie in several archives of the database.
             found.setdefault(path.name.lower(), (clip["label"], path.name, path, clip.groupdict()))
     return [(path, facts) for _, _, path, facts in sorted(found.values(), key=lambda c: c[:2])]
@@ -46,13 +46,13 @@ def find_skeletons(folder):
     return {path.stem.removeprefix("HDM_"): path for path in paths}
 
 
-def read_clips(folder, actions=ACTIONS, actors=ACTORS):
+def read_clips(folder):
     """The arrays of the archive."""
-    clips, skeletons = find_clips(folder, actions, actors), find_skeletons(folder)
+    clips, skeletons = find_clips(folder), find_skeletons(folder)
     if not clips:
         raise SystemExit(
-            f"There are no clips HDM_<actor>_<action>_<number>_120.amc of the actions {actions} "
-            f"and the actors {actors} below {folder}; download them as docs/benchmarks.md says."
+            f"There are no clips HDM_<actor>_<action>_<number>_120.amc of the actions {ACTIONS} "
+            f"and the actors {ACTORS} below {folder}; download them as docs/benchmarks.md says."
         )
     if missing := sorted({facts["actor"] for _, facts in clips} - set(skeletons)):
         raise SystemExit(f"The skeletons {[f'HDM_{m}.asf' for m in missing]} are not in {folder}.")
@@ -75,10 +75,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("output", type=Path)
-    parser.add_argument("--actions", nargs="+", default=ACTIONS)
-    parser.add_argument("--actors", nargs="+", default=ACTORS)
     args = parser.parse_args()
-    arrays = read_clips(args.folder, args.actions, args.actors)
+    arrays = read_clips(args.folder)
     args.output.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(args.output, **arrays)
     print(f"{args.output}: {len(arrays['label'])} clips, {len(arrays['positions'])} frames")

@@ -26,15 +26,12 @@ FEWEST = 20
 
 
 def judge(one):
-    """Errors, half-widths, whether each interval holds its moment, by event; doubts by clip.
-
-    Errors are absolute, in frames of 100.
-    """
+    """Absolute errors in frames of 100, half-widths, whether each interval holds, by event."""
     warnings.simplefilter("ignore")
     found = {event: [] for event in one.moments}
     for row, test, match in one.matches_of_strangers(partial(DenseSynchronizer, P)):
         n = one.patterns[row]
-        bounds, doubtful = [match.interval(c) for c in NOMINAL], match.doubtful
+        bounds = [match.interval(c) for c in NOMINAL]
         for event, at in one.moments.items():
             for j, i in enumerate(test):
                 if np.isfinite(at[n] + at[i]):
@@ -43,7 +40,7 @@ def judge(one):
                     low, high = bounds[1]
                     width = (read(high[j]) - read(low[j])) / 2
                     error = abs(read(match.times[j]) - at[i])
-                    found[event].append((error, width, doubtful[j], *held))
+                    found[event].append((error, width, *held))
     return {event: np.array(rows, dtype=float) for event, rows in found.items() if rows}
 
 
@@ -64,20 +61,16 @@ def people_table(folder):
     events = [rows for some in done for rows in some.values()]
     rows = np.concatenate(events)
     show("**all**", len(rows), rows.mean(axis=0))
-    equal = np.mean([row.mean(axis=0) for row in events], axis=0)
-    show("each event alike", f"{len(events)} events", equal)
     print(f"\nA constant half-width of 90 %: {np.quantile(rows[:, 0], 0.9):.1f} frames.")
     overall = spearmanr(rows[:, 1], rows[:, 0])[0]
     print(f"Spearman over all {overall:.2f}, inside an event {rank_correlation(events):.2f}.")
-    means = [rows[rows[:, 2] == d, 0].mean() for d in (0, 1)]
-    print(f"Mean error {means[0]:.1f} frames, of doubtful trials {means[1]:.1f}.")
     parts = np.array_split(rows[np.argsort(rows[:, 1])], 4)
     quarters = " ".join(f"{part[:, 0].mean():.1f}" for part in parts)
     print(f"Mean errors by quarter of half-width: {quarters}.\n", flush=True)
 
 
 def show(name, count, means):
-    error, width, _, *held = means
+    error, width, *held = means
     print_row(name, [str(count), f"{error:.1f}", f"{width:.1f}", *(f"{h:.0%}" for h in held)])
 
 

@@ -7,6 +7,7 @@ error of the other is judged on the pairs of clips that show both, with people w
 the fit. Errors are in frames of 100, mean and median. Prints Markdown.
 """
 
+from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -27,41 +28,19 @@ from sklearn_motionsync import ASpace, DenseSynchronizer, LinearSynchronizer
 FRAMES = np.arange(P)
 
 
-def own_frames(at, X):
-    """Moments in frames of 100 as key-frames of clips, one row each."""
-    return (np.asarray(at) / (P - 1) * (np.array([len(x) for x in X]) - 1))[:, np.newaxis]
-
-
-# -- the methods: warps of some clips to a pattern, after a fit to others ----------------------
-
-
-def nothing(X, at, pattern, others, of_others):
-    return DenseSynchronizer(P, pattern=pattern).fit(X).match(others).times
-
-
-def anchored(std):
-    """Dense matching with key-frames of this standard deviation."""
-
-    def times(X, at, pattern, others, of_others):
-        sync = DenseSynchronizer(P, pattern=pattern, keyframe_std=std)
-        sync.fit(X, keyframes=own_frames(at, X))
-        return sync.match(others, keyframes=own_frames(of_others, others)).times
-
-    return times
-
-
-def piecewise_linear(X, at, pattern, others, of_others):
-    sync = LinearSynchronizer(P, pattern=pattern)
-    sync.fit(X, keyframes=own_frames(at, X))
-    return sync.match(others, keyframes=own_frames(of_others, others)).times
-
-
+# What makes a synchronizer of a pattern; "nothing" is told no key-frames.
 METHODS = {
-    "nothing": nothing,
-    "exact": anchored(0),
-    "`keyframe_std=3`": anchored(3),
-    "piecewise linear": piecewise_linear,
+    "nothing": partial(DenseSynchronizer, P),
+    "exact": partial(DenseSynchronizer, P, keyframe_std=0),
+    "`keyframe_std=3`": partial(DenseSynchronizer, P, keyframe_std=3),
+    "piecewise linear": partial(LinearSynchronizer, P),
 }
+
+
+def told(name, at, X):
+    """What a method is told of clips: moments in frames of 100 as key-frames, one row each."""
+    keyframes = at[:, np.newaxis] / (P - 1) * (np.array([[len(x)] for x in X]) - 1)
+    return {} if name == "nothing" else {"keyframes": keyframes}
 
 
 # -- what is judged -----------------------------------------------------------------------------
@@ -74,7 +53,7 @@ def cases(folder):
             yield one, given, judged
 
 
-def errors_of_others(one, given, judged, method):
+def errors_of_others(one, given, judged, name):
     """Errors of the other moment, of people that had no part in the fit."""
     at, wanted = one.moments[given], one.moments[judged]
     seen = np.flatnonzero(np.isfinite(at + wanted))
@@ -86,7 +65,8 @@ def errors_of_others(one, given, judged, method):
         known, others = [points[i] for i in train], [points[i] for i in test]
         for row, pattern in enumerate(train):
             if seen[pattern] in one.patterns:
-                times = method(known, at[train], row, others, at[test])
+                sync = METHODS[name](pattern=row).fit(known, **told(name, at[train], known))
+                times = sync.match(others, **told(name, at[test], others)).times
                 landed = [np.interp(wanted[pattern], FRAMES, tau) for tau in times]
                 out.append(np.abs(landed - wanted[test]))
     return np.concatenate(out)
@@ -97,7 +77,7 @@ def given_table(folder):
     print_head("given", ["judged", "pairs", *METHODS])
     rows = {}
     for one, given, judged in cases(folder):
-        found = [errors_of_others(one, given, judged, method) for method in METHODS.values()]
+        found = [errors_of_others(one, given, judged, name) for name in METHODS]
         rows[one.name, given, judged] = [(np.mean(x), np.median(x)) for x in found]
         cells = [judged, str(len(found[0])), *map(show_pair, rows[one.name, given, judged])]
         print_row(f"{one.name}: {given}", cells)

@@ -94,9 +94,6 @@ class Fold(NamedTuple):
     and (n, P, b) on the clock of the training trials; kinds that are empty are left out.
     """
 
-    clips: str
-    action: str
-    actor: object
     train: list
     groups: np.ndarray
     on_clock: np.ndarray
@@ -117,7 +114,7 @@ def hold_out(clips, action, actor):
     synchronizer = DenseSynchronizer(P)
     on_clock = synchronizer.fit_transform(known)
     synchronised = {kind: synchronizer.transform(some) for kind, some in raw.items()}
-    return Fold(clips.name, action, actor, known, clips.actors[train], on_clock, raw, synchronised)
+    return Fold(known, clips.actors[train], on_clock, raw, synchronised)
 
 
 def hold_out_few(clips, action, actor, n_trials, rng):

@@ -10,57 +10,34 @@ import contextlib
 import os
 
 import numpy as np
-from harness import version_of
 
 
-def _from_pairs(pairs, n_frames):
-    """Mean partner of each frame; frames without one, as derivatives have at the ends, between."""
-    pairs = np.asarray(pairs)
-    frames = np.unique(pairs[:, 0])
-    partners = [pairs[pairs[:, 0] == frame, 1].mean() for frame in frames]
-    return np.interp(np.arange(n_frames), frames, partners)
-
-
-def tslearn_dtw(radius=None):
+def tslearn_barycenter(**constraint):
+    from tslearn.barycenters import dtw_barycenter_averaging
     from tslearn.metrics import dtw_path
 
-    constraint = {} if radius is None else {"sakoe_chiba_radius": radius}
-    return lambda x, y: _from_pairs(dtw_path(x, y, **constraint)[0], len(x))
-
-
-def tslearn_soft_dtw(gamma):
-    from tslearn.metrics import soft_dtw_alignment
-
-    def align(x, y):
-        # gamma in units of the mean squared distance of features from their mean
-        scale = np.square(x - x.mean(axis=0)).sum(axis=1).mean()
-        matrix = np.asarray(soft_dtw_alignment(x, y, gamma=gamma * scale)[0])
-        return matrix @ np.arange(len(y)) / matrix.sum(axis=1)
-
-    return align
-
-
-def tslearn_barycenter(radius=None):
-    from tslearn.barycenters import dtw_barycenter_averaging
-
-    constraint = {} if radius is None else {"sakoe_chiba_radius": radius}
-    to_mean = tslearn_dtw(radius)
-
     def align(X):
-        mean = dtw_barycenter_averaging(X, metric_params=constraint)
-        return np.array([to_mean(mean, x) for x in X])
+        mean, warps = dtw_barycenter_averaging(X, metric_params=constraint), []
+        for x in X:
+            frames, partners = np.transpose(dtw_path(mean, x, **constraint)[0])
+            warps.append(np.bincount(frames, partners) / np.bincount(frames))
+        return np.array(warps)
 
     return align
 
 
 def tslearn_soft_barycenter(gamma):
     from tslearn.barycenters import softdtw_barycenter
-
-    to_mean = tslearn_soft_dtw(gamma)
+    from tslearn.metrics import soft_dtw_alignment
 
     def align(X):
-        mean = softdtw_barycenter(X, gamma=gamma * np.square(X).sum(axis=2).mean())
-        return np.array([to_mean(mean, x) for x in X])
+        mean, warps = softdtw_barycenter(X, gamma=gamma * np.square(X).sum(axis=2).mean()), []
+        # gamma in units of the mean squared distance of features from their mean
+        scale = np.square(mean - mean.mean(axis=0)).sum(axis=1).mean()
+        for x in X:
+            matrix = np.asarray(soft_dtw_alignment(mean, x, gamma=gamma * scale)[0])
+            warps.append(matrix @ np.arange(len(x)) / matrix.sum(axis=1))
+        return np.array(warps)
 
     return align
 
@@ -79,15 +56,15 @@ def affinewarp_pieces(n_knots):
     return align
 
 
-def fdasrsf_mean(lam=0.0):
+def fdasrsf_mean():
     from fdasrsf.curve_stats import fdacurve
 
     def align(X):
         n_frames = X.shape[1]
         curves = fdacurve(np.ascontiguousarray(X.transpose(2, 1, 0)), N=n_frames)
         with open(os.devnull, "w") as unread, contextlib.redirect_stdout(unread):
-            curves.karcher_mean(rotation=False, lam=lam, cores=1)
-            curves.srvf_align(rotation=False, lam=lam)
+            curves.karcher_mean(rotation=False, cores=1)
+            curves.srvf_align(rotation=False)
         return curves.gams.T * (n_frames - 1)
 
     return align
@@ -95,7 +72,7 @@ def fdasrsf_mean(lam=0.0):
 
 BOTH = ("pose", "velocity")
 TIME_LINES = {
-    "tslearn DBA": ("tslearn", tslearn_barycenter, [{}, {"radius": 25}], BOTH),
+    "tslearn DBA": ("tslearn", tslearn_barycenter, [{}, {"sakoe_chiba_radius": 25}], BOTH),
     "tslearn soft-DTW barycentre": (
         "tslearn",
         tslearn_soft_barycenter,
@@ -110,11 +87,6 @@ TIME_LINES = {
     ),
     "fdasrsf Karcher mean": ("fdasrsf", fdasrsf_mean, [{}], ("pose", "smoothed")),
 }
-
-
-def installed(label):
-    """The version of a peer, or None."""
-    return version_of(TIME_LINES[label][0])
 
 
 def settings(label):

@@ -1,34 +1,32 @@
 """Hidden joints of people who were left out: `MotionTracker` beside a filter without a phase.
 
-    python benchmarks/tracking.py DATA_FOLDER [hdm05] [utkinect]
+    python benchmarks/tracking.py DATA_FOLDER
 
-*hdm05* are six actions at 30 frames a second, each actor held out in turn; *utkinect* ten actions
-of a Kinect, two of ten actors held out. Joints are moved by 1 cm in every coordinate, and some are
-hidden: *arm*, an elbow and its wrist; *legs*, knees and ankles; *gap*, all for 20 frames, half of
-the take where that is shorter. *moved*: all are seen, and moved by 5 cm. Two takes of each actor.
+Six actions of HDM05 at 30 frames a second, each actor held out in turn. Joints are moved by 1 cm in
+every coordinate, and some are hidden: *arm*, an elbow and its wrist; *legs*, knees and ankles;
+*gap*, all for 20 frames, half of the take where that is shorter. *moved*: all are seen, and moved
+by 5 cm. Two takes of each actor.
 
-The peer is a Kalman filter and smoother of a Matern-3/2 process about the mean pose of the
-training people, which knows no phase. It is told the covariance of the noise, simulated on training
-people, and has the best of its settings for each column, chosen by the result. The tracker has
-`JointNoise`. Mean error of the joints that are hidden (or moved), over takes, then over actions;
-the share of hidden cosines within bands of 90 %; and frames called lost, of right takes and of
-other actions under the same model. Prints Markdown.
+The peer is a Kalman filter of a Matern-3/2 process about the mean pose of the training people,
+which knows no phase. It is told the covariance of the noise, simulated on training people, and has
+the best of its settings for each column, chosen by the result. The tracker has `JointNoise`. Mean
+error of the joints that are hidden (or moved), over takes, then over actions; the share of hidden
+cosines within bands of 90 %; and frames called lost, of right takes and of other actions under the
+same model. Prints Markdown.
 """
 
-import functools
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from harness import P, command_line, percent, print_head, print_row, read_archive, run_tables
+from harness import P, command_line, percent, print_head, print_row, read_archive
 from scipy.linalg import cho_factor, cho_solve
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.body import JointNoise
 from sklearn_motionsync.live import MotionTracker
 
 KINDS = ("arm", "legs", "gap", "moved")
-SMALL, LARGE, GAP, TAKES = 0.01, 0.05, 20, 2
-STEP = {"hdm05": 4, "utkinect": 1}
+SMALL, LARGE, GAP, TAKES, STEP = 0.01, 0.05, 20, 2, 4
 # What keeps covariances of features that never move invertible: a twentieth of a degree.
 LEAST = 1e-6
 # Length scales of the peer, in frames, and shares by which its covariance is drawn to its diagonal.
@@ -58,28 +56,23 @@ def matern(takes, length, share):
 
 
 def kalman(model, y, noise):
-    """Means of a take ``y`` (n_frames, d), NaN where hidden, live and smoothed by Rauch's pass.
+    """Means of a take ``y`` (n_frames, d), NaN where hidden, of what was seen until then.
 
     ``noise`` is the covariance of what is seen.
     """
-    F, d, before, after = model.transition, y.shape[1], [], []
+    F, means = model.transition, []
     x, C = np.zeros(len(model.spread)), model.spread
     for t, row in enumerate(y):
         if t:
             x, C = F @ x, F @ C @ F.T + model.drive
-        before.append((x, C))
         seen = np.flatnonzero(~np.isnan(row))
         if len(seen):
             S = C[np.ix_(seen, seen)] + noise[np.ix_(seen, seen)]
             gain = cho_solve(cho_factor(S), C[seen])
             x, C = x + (row[seen] - x[seen]) @ gain, C - C[:, seen] @ gain
             C = (C + C.T) / 2
-        after.append((x, C))
-    smoothed = [after[-1][0]]
-    for (x, C), (ahead, spread) in zip(after[-2::-1], before[:0:-1], strict=True):
-        rest = cho_solve(cho_factor(spread), smoothed[-1] - ahead)
-        smoothed.append(x + C @ (F.T @ rest))
-    return np.array([x[:d] for x, _ in after]), np.array(smoothed[::-1])[:, :d]
+        means.append(x[: y.shape[1]])
+    return np.array(means)
 
 
 # -- people -----------------------------------------------------------------------------
@@ -146,41 +139,35 @@ class Fold:
         return 100 * np.linalg.norm(self.place(poses, x) - truth, axis=2)[counts].mean()
 
 
-def folds_of(folder, archive):
-    """Every action with its actors held out in turn, or two of many."""
-    bunch = read_archive(folder, archive)
-    rng = np.random.default_rng(0)
+def folds_of(folder):
+    """Every action with its actors held out in turn."""
+    bunch = read_archive(folder, "hdm05")
     for action in np.unique(bunch.target):
         chosen = np.flatnonzero(bunch.target == action)
-        takes = [np.asarray(bunch.data[i], dtype=float)[:: STEP[archive]] for i in chosen]
-        actors = np.unique(bunch.actor[chosen])
-        for held in actors if len(actors) < 5 else rng.permutation(actors)[:2]:
+        takes = [np.asarray(bunch.data[i], dtype=float)[::STEP] for i in chosen]
+        for held in np.unique(bunch.actor[chosen]):
             yield Fold(action, takes, bunch.actor[chosen], held, bunch.skeleton)
 
 
 # -- the table --------------------------------------------------------------------------
 
 
-def table(archive, folder):
-    """Errors live / smoothed of ours and of the peer, bands, and frames called lost."""
-    folds, errors, bands, lost = list(folds_of(folder, archive)), {}, {}, {}
+def table(folder):
+    """Errors of ours and of the peer, bands, and frames called lost."""
+    folds, errors, bands, lost = list(folds_of(folder)), {}, {}, {}
     for k, fold in enumerate(folds):
         models = {setting: matern(fold.poses, *setting) for setting in SETTINGS}
         wrong = next(each for each in folds[k:] + folds[:k] if each.action != fold.action)
         for i, (x, kind) in enumerate(product(fold.test, KINDS)):
             sd = LARGE if kind == "moved" else SMALL
             seen, counts = fold.case(x, kind, np.random.default_rng([k, i]))
-            tracker, truth = fold.trackers[sd], fold.cosines.transform([x])[0]
-            live = tracker.track(seen)
-            pair = live.poses, tracker.smooth(seen).poses
-            answers = {"`MotionTracker`": pair}
+            live, truth = fold.trackers[sd].track(seen), fold.cosines.transform([x])[0]
+            answers = {"`MotionTracker`": live.poses}
             for setting, (mean, model) in models.items():
-                found = kalman(model, seen - mean, fold.covariances[sd])
-                answers[setting] = tuple(mean + each for each in found)
-            for name, both in answers.items():
+                answers[setting] = mean + kalman(model, seen - mean, fold.covariances[sd])
+            for name, poses in answers.items():
                 rows = errors.setdefault(name, {}).setdefault(kind, {})
-                found = [fold.error(poses, x, counts) for poses in both]
-                rows.setdefault(fold.action, []).append(found)
+                rows.setdefault(fold.action, []).append(fold.error(poses, x, counts))
             wide = 1.645 * np.sqrt(np.diagonal(live.covariances, axis1=1, axis2=2))
             hidden = np.isnan(seen)
             if hidden.any():
@@ -191,18 +178,15 @@ def table(archive, folder):
                 moved = x + SMALL * np.random.default_rng(k).standard_normal(x.shape)
                 track = fold.trackers[SMALL].track(fold.cosines.transform([moved])[0])
                 lost.setdefault(name, []).append(track.lost.mean())
-    print_head(f"{archive}, cm, live / smoothed", KINDS)
+    print_head("cm", KINDS)
     means = {
-        name: np.array([
-            np.mean([np.mean(rows, axis=0) for rows in by_kind[kind].values()], axis=0)
-            for kind in KINDS
-        ])
+        name: [np.mean([np.mean(rows) for rows in by_kind[kind].values()]) for kind in KINDS]
         for name, by_kind in errors.items()
-    }  # fmt: skip
+    }
     rows = {"`MotionTracker`": means.pop("`MotionTracker`")}
     rows["without a phase, the best setting"] = np.min(list(means.values()), axis=0)
     for name, found in rows.items():
-        print_row(name, [f"{live:.2f} / {smoothed:.2f}" for live, smoothed in found])
+        print_row(name, [f"{x:.2f}" for x in found])
     print_row(
         "bands of 90 % hold, %", [percent(np.mean(bands.get(kind, np.nan))) for kind in KINDS]
     )
@@ -211,5 +195,4 @@ def table(archive, folder):
 
 
 if __name__ == "__main__":
-    tables = {name: functools.partial(table, name) for name in STEP}
-    run_tables(tables, command_line(__doc__))
+    table(command_line(__doc__).parse_args().folder)

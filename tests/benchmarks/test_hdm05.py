@@ -67,5 +67,3 @@ def test_missing_clips_and_skeletons_are_errors(hdm05, tmp_path, monkeypatch):
     (tmp_path / "HDM_bd_grabHighR_001_120.amc").touch()
     with pytest.raises(SystemExit, match=r"\['HDM_bd\.asf'\] are not in"):
         make(hdm05, monkeypatch, tmp_path, tmp_path / "a.npz")
-    with pytest.raises(SystemExit, match=r"There are no clips .* of the actions .*jump"):
-        make(hdm05, monkeypatch, tmp_path, tmp_path / "a.npz", "--actions", "jump")
