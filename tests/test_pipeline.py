@@ -151,9 +151,8 @@ def test_displays_and_scorers_take_key_frames(nested, routing, marked, points):
 @pytest.mark.parametrize("name", list(OF_PIPELINES)[:-1])
 def test_every_caller_says_how_to_give_key_frames(name, marked):
     for pipe in marked:
-        with pytest.raises(ValueError, match="fitted with key-frames") as error:
+        with pytest.raises(ValueError, match=r"fitted with key-frames.*keyframes=\[...\] beside X"):
             OF_PIPELINES[name](pipe, FEW.data)
-        assert f"{name}.from_estimator(estimator, X, keyframes=[...])" in str(error.value)
 
 
 @pytest.mark.parametrize("name", OF_PIPELINES)
@@ -178,8 +177,7 @@ def test_key_frames_reach_a_step_before_the_synchronizer(points):
     display = TrellisDisplay.from_estimator(pipe, points, trial=2, keyframes=K)
     expected = TrellisDisplay.from_estimator(steps[1], marked, trial=2)
     np.testing.assert_array_equal(display.space.costs, expected.space.costs)
-    message = r"TrellisDisplay.from_estimator\(estimator, X, keyframes="
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=r"keyframes=\[...\] beside X"):
         TrellisDisplay.from_estimator(pipe, points)
 
 

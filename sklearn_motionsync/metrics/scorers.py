@@ -67,14 +67,7 @@ class _SynchronizerScorer(BaseEstimator):
             If the synchronizer does not accept one of the params.
         """
         name = type(self).__name__
-        hint = (
-            f"; in cross_val_score and searches by metadata routing, sklearn.set_config("
-            f"enable_metadata_routing=True), scoring={name}().set_score_request({{name}}=True), "
-            "and params={{'{name}': [...]}} or search.fit(X, {name}=[...])"
-        )
-        reached = route_to_synchronizer(
-            estimator, X, params, f"{name}()", uses=self._uses, hint=hint
-        )
+        reached = route_to_synchronizer(estimator, X, params, f"{name}()", uses=self._uses)
         if len(reached.trials) < 2:
             raise ValueError(
                 f"{name} measures how much trials differ from each other, and got one. "

@@ -24,7 +24,6 @@ from ..utils.groups import encode_groups, group_counts
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from ..utils.pipelines import (
-    MissingMetadata,
     accepted_params,
     flat_steps,
     matches_of_a_fit,
@@ -441,18 +440,14 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         """Scores of trials, their facts, and what their reasons are found in."""
         check_is_fitted(self)
         tests = self._tests
-        try:
-            curves = curves_of(self.estimator_, X, params, caller, known)
-            whole, reached = curves.whole[..., tests.columns], curves.match.reached
-            of_person = None
-            if reference is not None:
-                known_of_theirs = remembered_matches().get("reference", {})
-                theirs = curves_of(self.estimator_, reference, {}, caller, known_of_theirs)
-                self._check_reference(reference, theirs.known, caller)
-                of_person = fill_with_mean(theirs.whole[..., tests.columns], tests.aligned.mean_)
-        except MissingMetadata as error:
-            reason, name, _ = error.args
-            raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error
+        curves = curves_of(self.estimator_, X, params, caller, known)
+        whole, reached = curves.whole[..., tests.columns], curves.match.reached
+        of_person = None
+        if reference is not None:
+            known_of_theirs = remembered_matches().get("reference", {})
+            theirs = curves_of(self.estimator_, reference, {}, caller, known_of_theirs)
+            self._check_reference(reference, theirs.known, caller)
+            of_person = fill_with_mean(theirs.whole[..., tests.columns], tests.aligned.mean_)
         trials = reached.trials
         on_clock = reached.synchronizer.normalize(trials)
         statistics, tails, acceptance = {}, {}, tests.acceptance

@@ -20,7 +20,6 @@ from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
     Routed,
     accepted_params,
-    explain_missing,
     find_step,
     find_synchronizer,
     flat_steps,
@@ -280,17 +279,14 @@ class _Route(NamedTuple):
         takers = [getattr(step, name) for step, name in methods if hasattr(step, name)]
         refuse_params(takers, params, caller)
         points, whole, matches, known = X, None, [], dict(known)
-        with explain_missing(caller):
-            for step in self.before:
-                points = _through(step, points, params, matches, X, known)
-            if self.aspace is not None:
-                whole = check_input(
-                    self.aspace, points, reset=False, level="pose", finite="allow-nan"
-                )
-                points = self.aspace.transform(points)
-            for step in self.after:
-                points = _through(step, points, params, matches, X, known)
-                whole = whole if whole is None else matches[-1].warp(whole)
+        for step in self.before:
+            points = _through(step, points, params, matches, X, known)
+        if self.aspace is not None:
+            whole = check_input(self.aspace, points, reset=False, level="pose", finite="allow-nan")
+            points = self.aspace.transform(points)
+        for step in self.after:
+            points = _through(step, points, params, matches, X, known)
+            whole = whole if whole is None else matches[-1].warp(whole)
         checked, match = self.model.check_trials(points), matches[0] if matches else None
         rate = params.get("frame_rate")
         facts = TrialFacts.of(X, rate, checked=checked) if match is None else match.facts

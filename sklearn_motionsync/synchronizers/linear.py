@@ -8,7 +8,6 @@ from ..inputs.validation import names_of_input
 from ..matching.anchors import first_meeting
 from ..matching.sizes import BATCH
 from ..matching.warps import even_slices, normalise, sample
-from ..utils.pipelines import MissingMetadata
 from .base import AnchoredSynchronizer
 from .match import Match
 from .training import check_pattern
@@ -82,9 +81,10 @@ class LinearSynchronizer(AnchoredSynchronizer):
 
     def _given(self, X, keyframes, frame_rate, confidence=None):
         if keyframes is None and getattr(self, "keyframes_", None) is not None:
-            raise MissingMetadata(
-                "The synchronizer was fitted with key-frames: give those of these trials too",
-                "keyframes",
+            raise ValueError(
+                "The synchronizer was fitted with key-frames: give those of these trials too, as "
+                "keyframes=[...] beside X. Searches and cross_val_score pass them on by metadata "
+                "routing, with set_score_request(keyframes=True) of the scorer."
             )
         return super()._given(X, keyframes, frame_rate, confidence)
 

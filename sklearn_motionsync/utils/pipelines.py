@@ -55,46 +55,6 @@ def remember_match(synchronizer, match):
     return matches is not None
 
 
-class MissingMetadata(ValueError):
-    """A synchronizer needs more than trials, such as key-frames.
-
-    Parameters
-    ----------
-    reason : str
-        What is missing, and why it is needed; the message goes on with the usage.
-    name : str
-        Of the parameter.
-    usage : str, default="{name}=[...]"
-        How to give the parameter to the function that was called.
-    """
-
-    def __init__(self, reason, name, usage="{name}=[...]"):
-        super().__init__(reason, name, usage)
-
-    def __str__(self):
-        reason, name, usage = self.args
-        return f"{reason}, {usage.format(name=name)}."
-
-
-@contextmanager
-def explain_missing(caller, hint=""):
-    """Let a `MissingMetadata` state the usage of a caller with the arguments (estimator, X).
-
-    Parameters
-    ----------
-    caller : str
-        The function that the user called.
-    hint : str, default=""
-        Other ways to give the parameter.
-    """
-    try:
-        yield
-    except MissingMetadata as error:
-        reason, name, _ = error.args
-        usage = f"{caller}(estimator, X, {{name}}=[...]){hint}"
-        raise MissingMetadata(reason, name, usage) from error
-
-
 class Routed(NamedTuple):
     """A fitted synchronizer, and its input through the steps before.
 
@@ -109,8 +69,6 @@ class Routed(NamedTuple):
         Other arguments of its ``match``, such as ``keyframes``.
     facts : TrialFacts
         Of the trials as they were recorded.
-    caller, hint : str
-        As of `explain_missing`.
     sums : ndarray, shape (n_sequences,), or None
         Of the values of the trials before the steps, which tell others of equal lengths; None
         where there are no steps.
@@ -123,8 +81,6 @@ class Routed(NamedTuple):
     trials: Trials
     params: dict
     facts: TrialFacts
-    caller: str = "match"
-    hint: str = ""
     sums: np.ndarray | None = None
     known: object = None
 
@@ -146,8 +102,7 @@ class Routed(NamedTuple):
         """The trials matched to the pattern."""
         if self.known is not None:
             return self.known
-        with explain_missing(self.caller, self.hint):
-            match = self.synchronizer.match(self.trials, **self.params)
+        match = self.synchronizer.match(self.trials, **self.params)
         if not hasattr(match, "of_trials"):
             # What a synchronizer gives in place of a match is refused where it is used.
             return match
@@ -157,7 +112,7 @@ class Routed(NamedTuple):
         return match.of_trials(self.facts, fitted)
 
 
-def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
+def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",)):
     """The synchronizer of an estimator, and its input made of raw trials.
 
     Parameters
@@ -174,8 +129,6 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
         Of the synchronizer; by default any.
     uses : tuple of str, default=("match",)
         Methods of the synchronizer that the caller gives params to.
-    hint : str, default=""
-        Other ways to give params.
 
     Returns
     -------
@@ -193,7 +146,7 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     )
     check_is_fitted(synchronizer)
     also = [getattr(synchronizer, name) for name in uses]
-    features = transform_through(before, X, params, caller, hint=hint, also=also)
+    features = transform_through(before, X, params, caller, also=also)
     trials = synchronizer.check_trials(features)
     accepted = accepted_params(synchronizer.match, params)
     facts = TrialFacts.of(X, params.get("frame_rate"), checked=trials)
@@ -203,7 +156,7 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
         rows = Keyframes(keyframes, len(trials)).in_order(trials)
         accepted["keyframes"] = pd.DataFrame(rows, columns=keyframes.columns)
     sums = None if before is None else _sums_of(X, trials)
-    return Routed(before, synchronizer, trials, accepted, facts, caller, hint, sums)
+    return Routed(before, synchronizer, trials, accepted, facts, sums)
 
 
 def _sums_of(X, trials):
@@ -244,16 +197,16 @@ def _of_match(match, X, params, caller, kind):
     rate = params.get("frame_rate")
     facts = match.facts if rate is None else match.facts.at(rate)
     known = match.of_trials(facts, reached)
-    return reached._replace(facts=facts, caller=caller, known=known)
+    return reached._replace(facts=facts, known=known)
 
 
-def transform_through(before, X, params, caller, *, hint="", also=()):
+def transform_through(before, X, params, caller, *, also=()):
     """Trials after the steps of a pipeline, each given the params that it accepts.
 
     Parameters
     ----------
     before : Pipeline or None
-    X, params, caller, hint : as for `route_to_synchronizer`
+    X, params, caller : as for `route_to_synchronizer`
     also : list of callable, default=()
         Methods after the last step that are given params, too.
 
@@ -263,9 +216,8 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
     """
     methods = [] if before is None else [step.transform for step in flat_steps(before)]
     refuse_params([*methods, *also], params, caller)
-    with explain_missing(caller, hint):
-        for method in methods:
-            X = method(X, **accepted_params(method, params))
+    for method in methods:
+        X = method(X, **accepted_params(method, params))
     return X
 
 

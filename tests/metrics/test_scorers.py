@@ -124,16 +124,9 @@ def test_holdout_refits_with_the_given_key_frames(bunch, points):
 @pytest.mark.parametrize("scorer", SCORERS)
 def test_missing_key_frames_are_refused_with_advice(scorer, bunch, points):
     sync = LinearSynchronizer(40).fit(points, keyframes=bunch.keyframes)
-    name = scorer.__name__
-    with pytest.raises(ValueError, match="fitted with key-frames") as error:
+    message = r"fitted with key-frames.*set_score_request\(keyframes=True\)"
+    with pytest.raises(ValueError, match=message):
         scorer()(sync, points)
-    for words in (
-        f"{name}()(estimator, X, keyframes=[...])",
-        f"scoring={name}().set_score_request(keyframes=True)",
-        "params={'keyframes': [...]}",
-    ):
-        assert words in str(error.value)
-    assert str(pickle.loads(pickle.dumps(error.value))) == str(error.value)
     with pytest.raises(ValueError, match="list of 8 arrays"):
         scorer()(sync, points, keyframes=bunch.keyframes[:3])
 
