@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Hashable
+from contextlib import suppress
 from numbers import Integral, Real
 from typing import Literal, Self
 
@@ -22,7 +23,6 @@ from ..model.action_model import ActionModel
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import (
-    add_unknown_label,
     encode_classes,
     encode_groups,
     refuse_classes_as_people,
@@ -238,7 +238,24 @@ class ActionClassifier(
         if isinstance(threshold, str):
             threshold = self.threshold_at(_COVERAGE)
         codes[decisions.max(axis=1) < threshold] = len(self.classes_)
-        return add_unknown_label(self.classes_)[codes]
+        kind, labels = self.classes_.dtype.kind, self.classes_.tolist()
+        if kind in "Mm":
+            return np.append(self.classes_, np.array("NaT", self.classes_.dtype))[codes]
+        label = "unknown" if kind in "UO" else -1
+        if label in labels:
+            raise ValueError(
+                f"{label!r} is one of the classes, and what trials are called that are rejected: "
+                "give the class another name, or set reject_below=None."
+            )
+        if kind in "UO":
+            return np.append(self.classes_, label)[codes]
+        # The first type of number that holds all labels.
+        for dtype in (self.classes_.dtype, np.int64, np.float64):
+            with suppress(OverflowError):
+                held = np.array([*labels, label], dtype)
+                if held.tolist() == [*labels, label]:
+                    return held[codes]
+        return np.array([*labels, label], dtype=object)[codes]
 
     def score(self, X: TrialsLike, y: Labels, sample_weight: ValuesLike | None = None) -> float:
         """Share of trials that are given their class.
@@ -412,14 +429,7 @@ def choose_landmarks(codes, groups, n_landmarks):
     # Multiples of the golden ratio, modulo 1, are evenly spread over the trials of a group,
     # and over the groups of a class.
     spread = (np.arange(n) * _GOLDEN) % 1
-    in_group = _ranks(codes * (groups.max() + 1) + groups, spread)
-    in_class = _ranks(codes, in_group + (groups + codes) * _GOLDEN % 1)
+    in_group = pd.Series(spread).groupby([codes, groups]).rank("first") - 1
+    keys = in_group + (groups + codes) * _GOLDEN % 1
+    in_class = keys.groupby(codes).rank("first")
     return np.sort(np.lexsort((codes, in_class))[:n_landmarks])
-
-
-def _ranks(cells, keys):
-    """The rank of each key (n,) among those of its cell, from 0."""
-    order = np.lexsort((keys, cells))
-    ranks = np.empty(len(cells), dtype=np.intp)
-    ranks[order] = np.arange(len(cells)) - np.searchsorted(cells[order], cells[order])
-    return ranks

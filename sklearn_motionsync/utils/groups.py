@@ -2,7 +2,6 @@
 
 import reprlib
 from collections.abc import Iterable, Mapping, Set, Sized
-from contextlib import suppress
 
 import numpy as np
 import pandas as pd
@@ -152,54 +151,6 @@ def encode_classes(y, trials, estimator_name):
             f"{classes.tolist()[0]!r}. An ActionDetector learns a single action."
         )
     return classes, codes
-
-
-def add_unknown_label(classes):
-    """The classes and, behind them, the label of trials that belong to none of them.
-
-    That is "unknown" among text, -1 among numbers, NaT among dates and durations.
-
-    Parameters
-    ----------
-    classes : ndarray, shape (n_classes,)
-        As `encode_classes` returns them.
-
-    Returns
-    -------
-    ndarray, shape (n_classes + 1,)
-        Numbers in the dtype of the classes, or if that does not hold -1, in one that holds all:
-        integers of 64 bits, floats of 64 bits, or objects.
-
-    Raises
-    ------
-    ValueError
-        If the label is one of the classes.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sklearn_motionsync.utils.groups import add_unknown_label
-    >>> add_unknown_label(np.array([3, 255], dtype=np.uint8))
-    array([  3, 255,  -1])
-    """
-    if classes.dtype.kind in _DATES:
-        return np.append(classes, np.array("NaT", classes.dtype))
-    is_text = classes.dtype.kind in "UO"
-    label = "unknown" if is_text else -1
-    if label in classes.tolist():
-        raise ValueError(
-            f"{label!r} is one of the classes, and what trials are called that are rejected: give "
-            "the class another name, or set reject_below=None."
-        )
-    if is_text:
-        return np.append(classes, label)
-    labels = [*classes.tolist(), label]
-    for dtype in (classes.dtype, np.int64, np.float64):
-        with suppress(OverflowError):
-            held = np.array(labels, dtype)
-            if held.tolist() == labels:
-                return held
-    return np.array(labels, dtype=object)
 
 
 def sums_of_groups(values, codes):
