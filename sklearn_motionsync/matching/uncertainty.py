@@ -72,30 +72,22 @@ def uncertainty_of_paths(matcher, base, moving, times):
     """
     n_frames, trellis = times.shape[1], matcher.trellis
     coarse = np.unique(np.round(np.linspace(0, n_frames - 1, _FRAMES)).astype(np.intp))
-    base, moving = base[:, coarse], moving[:, coarse * trellis.table.subframes]
-    trellis = _coarse(matcher, n_frames, len(coarse))
+    base, moving = base[:, coarse], moving[:, coarse]
+    trellis = Trellis.on_clock(
+        matcher.features.cost,
+        len(coarse),
+        trellis.mu,
+        max_offset=trellis.reach / n_frames,
+        max_rate=trellis.table.steps.max(),
+        unseen=trellis.unseen,
+        anchors=trellis.anchors and trellis.anchors.at(len(coarse)),
+    )
     per_frame = (n_frames - 1) / (len(coarse) - 1)
     spread, shares = _spread_of_paths(trellis, base, moving, times[:, coarse] / per_frame)
     frames, scale = np.arange(n_frames), _SCALE * per_frame
     widths = np.array([np.interp(frames, coarse, scale * row) for row in spread])
     widest = np.minimum(2 * widths.max(axis=1) / (n_frames - 1), 1)
     return Uncertainty(widths, np.zeros(len(times), bool), shares, widest)
-
-
-def _coarse(matcher, n_frames, count):
-    """The trellis of a matcher on so many of the frames of the clock, one position each."""
-    trellis, table = matcher.trellis, matcher.trellis.table
-    if count == n_frames and table.subframes == 1:
-        return trellis
-    return Trellis.on_clock(
-        matcher.features.cost,
-        count,
-        trellis.mu,
-        max_offset=trellis.reach / n_frames,
-        max_rate=table.steps.max() / table.subframes,
-        unseen=trellis.unseen,
-        anchors=trellis.anchors and trellis.anchors.at(count),
-    )
 
 
 def _spread_of_paths(trellis, base, moving, times):

@@ -13,10 +13,8 @@ from oracle import all_paths, path_cost, step_costs
 P, REACH, MU = 7, 3, 0.4
 
 
-def matcher_of(cost, n_frames=P, subframes=1):
-    trellis = Trellis.on_clock(
-        cost, n_frames, MU, max_offset=REACH / P, max_rate=2, subframes=subframes
-    )
+def matcher_of(cost, n_frames=P):
+    trellis = Trellis.on_clock(cost, n_frames, MU, max_offset=REACH / P, max_rate=2)
     return Matcher(Features(cost, 1, 0.0, None), trellis)
 
 
@@ -56,10 +54,6 @@ def test_spread_equals_that_of_all_paths(cost):
     widest = np.minimum(2 * found.half_widths.max(axis=1) / (P - 1), 1)
     np.testing.assert_allclose(found.widest, widest)
     assert not found.is_normal.any()
-    # Positions between frames are passed over.
-    between = np.repeat(moving, 2, axis=1)[:, :-1] + [[[0], [9]] * (P - 1) + [[0]]]
-    finer = uncertainty_of_paths(matcher_of(cost, subframes=2), base, between, times)
-    np.testing.assert_allclose(finer.half_widths, found.half_widths, rtol=1e-9)
 
 
 def test_long_clocks_are_compared_at_81_frames():
