@@ -4,8 +4,8 @@ import functools
 import math
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import correlate1d, gaussian_filter1d
+from scipy.signal import fftconvolve
 from sklearn import get_config
 
 from .counting import ROUNDING
@@ -56,12 +56,12 @@ def smooth(on_clock, sigma, order=0):
         before = 2 * batch[:, :1] - batch[:, reach:0:-1]
         after = 2 * batch[:, -1:] - batch[:, -2 : -reach - 2 : -1]
         continued = np.concatenate([before, batch, after], axis=1)
-        if sigma > _WIDE:
-            filtered = _convolve(continued, kernel, reach)
+        if sigma > _WIDE and len(kernel) <= 2 * reach + 1:
+            # One at a time: no result may depend on the other sequences.
+            filtered = [fftconvolve(x, kernel[:, np.newaxis], "same", axes=0) for x in continued]
         else:
             filtered = correlate1d(continued, kernel[::-1], axis=1, mode="nearest")
-            filtered = filtered[:, reach:-reach]
-        out[start : start + size] = filtered
+        out[start : start + size] = np.asarray(filtered)[:, reach:-reach]
     return out
 
 
@@ -74,23 +74,6 @@ def _kernel(sigma, order):
     kernel = gaussian_filter1d(impulse, sigma, order=order, mode="constant")
     kernel.flags.writeable = False
     return kernel
-
-
-def _convolve(sequences, kernel, reach):
-    """The same filter by Fourier transforms; without ``reach`` positions at both ends."""
-    margin = len(kernel) // 2
-    if margin > reach:
-        # The filter is longer than the reflections: their ends go on.
-        edges = [(0, 0), (margin - reach, margin - reach), (0, 0)]
-        sequences, reach = np.pad(sequences, edges, mode="edge"), margin
-    length = next_fast_len(sequences.shape[1] + 2 * margin, real=True)
-    spectrum = rfft(kernel, length)[:, np.newaxis]
-    out = np.empty_like(sequences)
-    for result, sequence in zip(out, sequences, strict=True):
-        # One at a time: no result may depend on the other sequences.
-        filtered = irfft(rfft(sequence, length, axis=0) * spectrum, length, axis=0)
-        result[:] = filtered[margin : margin + len(sequence)]
-    return out[:, reach:-reach]
 
 
 def white_noise(arrays):
