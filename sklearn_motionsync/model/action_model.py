@@ -389,7 +389,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         ndarray, shape (n_sequences,)
             ``log(threshold / dissimilarity)``: negative for trials that are rejected.
         """
-        return np.log(self.threshold_ / np.maximum(self.dissimilarity(X), LEAST))
+        dissimilarity = np.maximum(self.dissimilarity(X), LEAST)
+        return np.log(self.threshold_ / dissimilarity)
 
     def predict(self, X: TrialsLike) -> np.ndarray:
         """Whether trials are the action, by their movement alone.
