@@ -218,13 +218,7 @@ def compare_to_norm(
     """
     check_level(level)
     aligned = AlignedCurves.of(
-        estimator,
-        X,
-        params,
-        "compare_to_norm",
-        signals=signals,
-        features=features,
-        unit=unit,
+        estimator, X, params, "compare_to_norm", signals=signals, features=features, unit=unit
     )
     norm_trials, subjects = _people_of_norm(y, norm, groups, len(aligned.curves))
     timing = aligned.offsets[:, :, np.newaxis]
@@ -235,11 +229,7 @@ def compare_to_norm(
     z = (curves - mean) / std
     counts = [len(trials) for *_, trials in subjects]
     p, limits = _chances(z, counts, of_norm, float(level))
-    joint = np.minimum(1, 2 * p.min(axis=1))
-    columns = {"group": [group for _, group, _ in subjects], "n_trials": counts, "p": joint}
-    columns |= {"p_shape": p[:, 0], "p_timing": p[:, 1], "differs": joint <= level}
-    index = pd.Index([label for label, *_ in subjects], name="subject")
-    verdicts = pd.DataFrame(columns, index=index)
+    verdicts = _verdicts(subjects, counts, p, level)
     names, units = [*aligned.names, "offset"], [*aligned.units, UNITS[aligned.unit]]
     return NormComparison(
         verdicts=verdicts,
@@ -336,6 +326,14 @@ def _people_of_norm(y, norm, groups, n):
             f"The norm needs at least {_FEWEST} people, got {len(of_norm)} in {norm!r}."
         )
     return of_norm, subjects
+
+
+def _verdicts(subjects, counts, p, level):
+    """The table of verdicts of subjects, from the probabilities p (n, 2) in shape and in timing."""
+    joint = np.minimum(1, 2 * p.min(axis=1))
+    columns = {"group": [group for _, group, _ in subjects], "n_trials": counts, "p": joint}
+    columns |= {"p_shape": p[:, 0], "p_timing": p[:, 1], "differs": joint <= level}
+    return pd.DataFrame(columns, index=pd.Index([label for label, *_ in subjects], name="subject"))
 
 
 def _departures(z, differences, limits, verdicts, names, units, aligned):

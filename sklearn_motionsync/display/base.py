@@ -76,9 +76,9 @@ def empty_lists(n: int) -> list[list]:
 class Display:
     """The base of all displays: a figure with panels, which may be drawn any number of times.
 
-    A display is computed before it is drawn: what is drawn are attributes, which its class names
-    and ``from_estimator`` sets. It tells the layout of its panels (`_layout`), and draws on them
-    (`_draw`).
+    A display is computed before it is drawn: what is drawn are attributes, which its class lists
+    and ``from_estimator`` computes. It tells the layout of its panels (`_layout`), and draws on
+    them (`_draw`).
 
     Attributes
     ----------
@@ -90,6 +90,13 @@ class Display:
 
     figure_: Any
     axes_: list
+
+    @classmethod
+    def _of(cls, **drawn: Any) -> Self:
+        """A display of what is drawn, by the names that its class lists."""
+        display = cls()
+        vars(display).update(drawn)
+        return display
 
     def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.

@@ -124,28 +124,28 @@ class CycleDisplay(Display):
         longest = (as_learnt(estimator, x, repeats) if fitted else repeats).correlation
         row = segmenter.report(recordings[:1]).iloc[0]
         segmenter.set_params(start=estimator.start_ if fitted else estimator.start)
-        display = cls()
-        name, display.curve = _curve_of(segmenter, recordings[0], x)
-        display.cuts, cycles = np.array([], dtype=int), ""
+        name, curve = _curve_of(segmenter, recordings[0], x)
+        cuts, cycles = np.array([], dtype=int), ""
         if fitted and row["cyclic"]:
             _, origin = estimator.segment(recordings[:1])
             whole = origin[origin["complete"]]
-            display.cuts = np.unique([whole["start"], whole["stop"] - 1])
+            cuts = np.unique([whole["start"], whole["stop"] - 1])
             cycles = counted(len(whole), "whole cycle")
         facts = TrialFacts.of([recordings[0]], frame_rate)
         lasting = facts.durations() if unit == "seconds" else None
-        n_frames = len(display.curve)
-        display.axis = TimeAxis(unit, n_frames, [n_frames], lasting)
-        (display.label,) = labels_of_signals([name], units_of_columns(recordings[0]), units)
+        (label,) = labels_of_signals([name], units_of_columns(recordings[0]), units)
         period = f"period {longest.period:.1f} frames" if row["period"] > 0 else ""
         several = f"{len(row['stretches'])} stretches" if len(row["stretches"]) > 1 else ""
-        found = filter(None, [row["reason"], several, period, cycles])
-        display.title = ", ".join(found) or "no period"
-        display.repeats = longest if row["period"] > 0 else longest._replace(period=np.nan)
-        display.stretches = row["stretches"]
-        threshold = required_strength(np.inf, longest.breadth, segmenter.threshold)
-        display.threshold = float(threshold)
-        return display.plot(ax)
+        return cls._of(
+            repeats=longest if row["period"] > 0 else longest._replace(period=np.nan),
+            curve=curve,
+            label=label,
+            axis=TimeAxis(unit, len(curve), [len(curve)], lasting),
+            cuts=cuts,
+            stretches=row["stretches"],
+            threshold=float(required_strength(np.inf, longest.breadth, segmenter.threshold)),
+            title=", ".join(filter(None, [row["reason"], several, period, cycles])) or "no period",
+        ).plot(ax)
 
     def _layout(self):
         return [0, 1], (2, 1), (WIDTH, 4.8)

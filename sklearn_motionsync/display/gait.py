@@ -103,8 +103,7 @@ class GaitDisplay(Display):
         walk = recordings.walk(i)
         events_of_walk = events_of(walk, recordings.split_events(events)[i])
         rows = np.arange(0, walk.n_samples, walk.per_frame)
-        display = cls()
-        scale, display.unit = recordings.length_of_leg(i, walk)
+        scale, unit = recordings.length_of_leg(i, walk)
         ends = {"heel": walk.heels, "toe": walk.toes}
         heights = {
             f"{side}_{end}": scale * of_sides[side][rows, 1]
@@ -113,10 +112,12 @@ class GaitDisplay(Display):
             if side in of_sides
         }
         floor = min(np.nanmin(values) for values in heights.values())
-        display.heights = {name: values - floor for name, values in heights.items()}
-        display.times = recordings.times_at(i, np.arange(len(rows)))
-        display.events = tabulate_events(recordings, i, walk, events_of_walk)
-        return display.plot(ax)
+        return cls._of(
+            times=recordings.times_at(i, np.arange(len(rows))),
+            heights={name: values - floor for name, values in heights.items()},
+            events=tabulate_events(recordings, i, walk, events_of_walk),
+            unit=unit,
+        ).plot(ax)
 
     def _layout(self):
         count = len(self._sides()) + 1

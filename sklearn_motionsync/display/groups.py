@@ -243,22 +243,21 @@ class GroupDisplay(Display):
             differing = comparison.clusters.query("what == 'shape'")["feature"]
             others = list(dict.fromkeys(differing[~differing.isin(names)]))
             notes += [f"differences also in {', '.join(others)}"] * bool(others)
-        whom = "trials" if groups is None else "people"
+        has_people = groups is not None
+        whom = "people" if has_people else "trials"
         title = _STATISTICS[statistic].format(whom=whom, share=100 * _COVERAGE)
         of_people = GroupsOfPeople.of(y, groups, len(aligned.curves))
-        display = cls()
-        display.groups = _curves_of_groups(
-            of_people, aligned, chosen, statistic, trials, groups is not None
-        )
-        display.axis = TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel)
-        display.feature_names = names
         known_units = dict(zip(aligned.names, aligned.units, strict=True))
-        display.ylabels = labels_of_signals(names, known_units, units)
-        display.title = "; ".join(filter(None, [title, ", ".join(notes)]))
-        display.events = _events_on_clock(events, aligned, of_people)
-        display.comparison = comparison
-        display.pairs = groups is not None and of_people.are_pairs
-        return display.plot(ax)
+        return cls._of(
+            groups=_curves_of_groups(of_people, aligned, chosen, statistic, trials, has_people),
+            axis=TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel),
+            ylabels=labels_of_signals(names, known_units, units),
+            feature_names=names,
+            title="; ".join(filter(None, [title, ", ".join(notes)])),
+            events=_events_on_clock(events, aligned, of_people),
+            comparison=comparison,
+            pairs=has_people and of_people.are_pairs,
+        ).plot(ax)
 
     @property
     def offsets(self) -> list[np.ndarray]:
@@ -516,11 +515,11 @@ class NormDisplay(Display):
             chosen = choose_features(features, signals)
         names = [signals[k] for k in chosen]
         known_units = dict(zip(comparison.features, comparison.units, strict=True))
-        display = cls()
-        display.comparison, display.subject, display.signals = comparison, subject, chosen
-        display.labels = labels_of_signals(names, known_units, units)
-        display.axis = TimeAxis.of_clock(comparison.unit, comparison.clock, xlabel)
-        return display.plot(ax)
+        labels = labels_of_signals(names, known_units, units)
+        axis = TimeAxis.of_clock(comparison.unit, comparison.clock, xlabel)
+        return cls._of(
+            comparison=comparison, subject=subject, signals=chosen, labels=labels, axis=axis
+        ).plot(ax)
 
     def _layout(self):
         return signal_layout(len(self.signals), 1.0)

@@ -107,12 +107,11 @@ def _bones_of_limb(limb, skeleton):
     return [ends] if ends in skeleton.bones else [b for b in skeleton.bones if b[1] in ends]
 
 
-def set_departures(display, estimator, X, params, caller, *, trial, frames, reference):
-    """Set what a display draws of the departures of a trial.
+def departing_bodies(estimator, X, params, caller, *, trial, frames, reference):
+    """What a `SkeletonDisplay` draws of the departures of a trial: a dict of its attributes.
 
     Parameters
     ----------
-    display : SkeletonDisplay
     estimator : Pipeline
     X, params, caller
         As for `view_of`.
@@ -140,9 +139,7 @@ def set_departures(display, estimator, X, params, caller, *, trial, frames, refe
         is_accepted = not judged.refused[i]
     # Hints would hide what is rare, and most right trials have some.
     rows = [row for row in rows if row.rare] or ([] if is_accepted else rows)
-    shown, display.titles, display.marked = limb_departures(
-        rows, len(judged.mean), frames, skeleton
-    )
+    shown, titles, marked = limb_departures(rows, len(judged.mean), frames, skeleton)
     bodies, shadows = (
         np.asarray(limbs.cosines.inverse_transform(limbs.invert(x)))
         for x in (judged.curves[i], judged.mean)
@@ -156,13 +153,14 @@ def set_departures(display, estimator, X, params, caller, *, trial, frames, refe
     verdict = "accepted" if is_accepted else "not accepted"
     whose = "a new person" if reference is None else "this person"
     rare = [describe_departure(row) for row in rows if row.rare and row.limb is not None]
-    display.heading = (
+    heading = (
         f"{name_trial(i, view.labels[i])} is {verdict}.\n"
         f"Rare: {', '.join(rare) if rare else 'nothing'}. Violet: limbs that depart at or around "
         f"that frame. Pale: what is expected of {whose}."
     )
-    display.scenes, display.behind = ([[x[[frame]]] for frame in shown] for x in (bodies, shadows))
-    display.skeleton = skeleton
+    scenes, behind = ([[x[[frame]]] for frame in shown] for x in (bodies, shadows))
+    drawn = {"scenes": scenes, "behind": behind, "skeleton": skeleton}
+    return drawn | {"titles": titles, "marked": marked, "heading": heading}
 
 
 def split_at_synchronizer(estimator):

@@ -165,30 +165,31 @@ class PhaseDisplay(MovingDisplay):
         if features is None:
             features = [first_largest(live.mean_.var(axis=0))]
         shown = choose_features(features, feature_names)
-        display = cls()
-        bodies: list = [None] * (len(seen) + 1)
+        skeleton, bodies = None, [None] * (len(seen) + 1)
         if body is not None:
             skeleton = find_step(body, DirectionCosines)[1].skeleton.body()
-            display.skeleton = skeleton
             bodies = [invert_poses(x, body, skeleton) for x in (*seen, live.mean_)]
         duration = live.duration_ / (live.frame_rate or 1.0)
-        display.action = LearntAction(
+        action = LearntAction(
             live.n_frames_, live.cyclic, duration, live.mean_[:, shown], bodies[-1]
         )
-        display.trials = []
+        running = []
         for k, (x, phases) in enumerate(zip(seen, tracked, strict=True)):
             stamps_of_trial = None if stamps is None else stamps[k]
             clock = times_from_zero(stamps_of_trial, len(x), live.frame_rate)
-            left = display.action.times_left(phases, clock)
-            running = RunningTrial(phases, clock, left, names[k], x[:, shown], bodies[k])
-            display.trials.append(running)
+            left = action.times_left(phases, clock)
+            running.append(RunningTrial(phases, clock, left, names[k], x[:, shown], bodies[k]))
         labels = [feature_names[k] for k in shown]
-        display.features = labels_of_signals(labels, units_of_columns(trials[0]), units)
-        display.xlabel = time_label(live.frame_rate)
-        longest = max((p.times for p in display.trials), key=lambda times: times[-1])
+        longest = max((p.times for p in running), key=lambda times: times[-1])
         last = len(longest) - 1
-        display.time = longest[last if frame is None else as_index(frame, last + 1, "frame")]
-        return display.plot(ax)
+        return cls._of(
+            action=action,
+            trials=running,
+            features=labels_of_signals(labels, units_of_columns(trials[0]), units),
+            skeleton=skeleton,
+            xlabel=time_label(live.frame_rate),
+            time=longest[last if frame is None else as_index(frame, last + 1, "frame")],
+        ).plot(ax)
 
     def _layout(self):
         # Two panels beside each other; an odd last one has the whole width.

@@ -179,19 +179,20 @@ class ActionModelDisplay(Display):
             before, _ = find_step(estimator, ActionModel)
             undo, known_units = undo_scaling(before, X, model.mean_.shape[1])
             drawn = [undo(x) for x in drawn]
-        display = cls()
-        display.mean, display.lower, display.upper, *trials = (x[:, chosen] for x in drawn)
-        display.trials = np.stack(trials) if trials else None
-        if view.curves is None:
-            facts = TrialFacts.of([n_frames], params.get("frame_rate"))
-        else:
-            facts = view.curves.facts
+        mean, lower, upper, *trials = (x[:, chosen] for x in drawn)
+        rate = params.get("frame_rate")
+        facts = TrialFacts.of([n_frames], rate) if view.curves is None else view.curves.facts
         lasting = facts.durations() if unit == "seconds" else None
         keyframes = _keyframes_of(estimator, n_frames, params.get("keyframes"))
-        display.axis = TimeAxis(unit, n_frames, None, lasting, xlabel, keyframes=keyframes)
-        display.ylabels = labels_of_signals([view.names[i] for i in chosen], known_units, units)
-        display.titles = (_BAND_TITLES[band].format(100 * model.coverage), what)
-        return display.plot(ax)
+        return cls._of(
+            mean=mean,
+            lower=lower,
+            upper=upper,
+            trials=np.stack(trials) if trials else None,
+            axis=TimeAxis(unit, n_frames, None, lasting, xlabel, keyframes=keyframes),
+            ylabels=labels_of_signals([view.names[i] for i in chosen], known_units, units),
+            titles=(_BAND_TITLES[band].format(100 * model.coverage), what),
+        ).plot(ax)
 
     def _layout(self):
         count = len(self.ylabels)

@@ -92,19 +92,18 @@ class SearchDisplay(Display):
         ValueError
             If segments are of other takes; or as from `find_trials`.
         """
-        display = cls()
-        _, display.origin = find_trials(pattern, X, threshold=None, **params)
+        _, origin = find_trials(pattern, X, threshold=None, **params)
         takes = as_trials(X)
         lengths = dict(zip(labels_of(takes)[0], map(len, takes), strict=True))
-        display.lengths = lengths
+        true_segments = None
         if segments is not None:
-            display.segments = pd.DataFrame(segments, columns=["take", "start", "stop"])
-            unknown = [take for take in display.segments["take"] if take not in lengths]
+            true_segments = pd.DataFrame(segments, columns=["take", "start", "stop"])
+            unknown = [take for take in true_segments["take"] if take not in lengths]
             if unknown:
                 raise ValueError(
                     f"segments names the take {unknown[0]!r}; the takes are {list(lengths)[:8]}."
                 )
-        return display.plot(ax)
+        return cls._of(origin=origin, lengths=lengths, segments=true_segments).plot(ax)
 
     def _shown(self):
         return list(self.lengths)[:_MAX_PANELS]

@@ -34,7 +34,7 @@ from .bodies import (
     read_positions,
     stage,
 )
-from .limb_departures import set_departures, split_at_synchronizer
+from .limb_departures import departing_bodies, split_at_synchronizer
 
 # The largest number of panels in a row.
 _PANELS_A_ROW = 4
@@ -144,11 +144,9 @@ class SkeletonDisplay(MovingDisplay):
             for i, x in enumerate(as_trials(X, skeleton))
         ]
         shown = as_frames(frames, min(map(len, bodies)))
-        display = cls()
-        display.skeleton = skeleton
-        display.titles = [f"frame {frame}" for frame in shown]
-        display.scenes = [[x[[frame]] for x in bodies] for frame in shown]
-        return display.plot(ax, azimuth=azimuth)
+        titles = [f"frame {frame}" for frame in shown]
+        scenes = [[x[[frame]] for x in bodies] for frame in shown]
+        return cls._of(scenes=scenes, skeleton=skeleton, titles=titles).plot(ax, azimuth=azimuth)
 
     @classmethod
     def from_trials(
@@ -189,16 +187,17 @@ class SkeletonDisplay(MovingDisplay):
         """
         X = as_trials(X, skeleton)
         bodies = [place_on_floor(read_positions(x, skeleton, i), skeleton) for i, x in enumerate(X)]
-        display = cls()
-        display.skeleton, display.labels = skeleton, names_of_trials(names, X)
-        display.scenes, display.titles = [bodies], ["each at its own pace"]
+        labels, durations = names_of_trials(names, X), None
+        scenes, titles = [bodies], ["each at its own pace"]
         if match is not None:
             warped = match.warp([x.reshape(len(x), -1) for x in bodies])
             aligned = list(warped.reshape(*warped.shape[:2], *bodies[0].shape[1:]))
             recorded = [float(len(x) - 1) for x in bodies]
-            display.scenes, display.titles = [bodies, aligned], ["as recorded", "aligned"]
-            display.durations = [recorded, [float(np.median(recorded))] * len(bodies)]
-        return display.plot(ax, at=at, azimuth=azimuth)
+            scenes, titles = [bodies, aligned], ["as recorded", "aligned"]
+            durations = [recorded, [float(np.median(recorded))] * len(bodies)]
+        return cls._of(
+            scenes=scenes, skeleton=skeleton, titles=titles, durations=durations, labels=labels
+        ).plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
     def from_estimator(
@@ -318,9 +317,7 @@ class SkeletonDisplay(MovingDisplay):
                 f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
-        display = cls()
-        display.scenes, display.skeleton, display.titles = scenes, skeleton, titles
-        return display.plot(ax, azimuth=azimuth)
+        return cls._of(scenes=scenes, skeleton=skeleton, titles=titles).plot(ax, azimuth=azimuth)
 
     @classmethod
     def from_departures(
@@ -386,10 +383,12 @@ class SkeletonDisplay(MovingDisplay):
         sklearn_motionsync.model.find_departures : The departures as a table.
         ActionModelDisplay : The curves of the trial, and the band that they leave.
         """
-        display, caller = cls(), f"{cls.__name__}.from_departures"
-        asked = {"trial": trial, "frames": frames, "reference": reference}
-        set_departures(display, estimator, X, params, caller, **asked)
-        return display.plot(ax, azimuth=azimuth)
+        caller = f"{cls.__name__}.from_departures"
+        return cls._of(
+            **departing_bodies(
+                estimator, X, params, caller, trial=trial, frames=frames, reference=reference
+            )
+        ).plot(ax, azimuth=azimuth)
 
     def plot(
         self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float | None = None

@@ -155,34 +155,32 @@ class SynchronizationDisplay(Display):
             The display, drawn.
         """
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
-        before, synchronizer, trials = reached[:3]
+        steps, synchronizer, trials = reached[:3]
         width = trials[0].shape[1]
-        names = names_of_features(before, synchronizer, width)
+        names = names_of_features(steps, synchronizer, width)
         chosen = choose_features(features, names)
-        undo, known_units = undo_scaling(before, X, width)
-        display = cls()
-        display.match = reached.match()
-        display.before = [undo(x)[:, chosen] for x in trials]
-        display.after = display.match.warp(display.before)
-        display.pattern = undo(synchronizer.pattern_)[:, chosen]
-        display.axis = TimeAxis(
-            unit,
-            len(display.pattern),
-            [len(x) for x in trials],
-            reached.facts.durations() if unit == "seconds" else None,
-            xlabel,
-            keyframes=named_keyframes(synchronizer, reached.params.get("keyframes")),
-            trial_keyframes=reached.keyframes,
+        undo, known_units = undo_scaling(steps, X, width)
+        match, before = reached.match(), [undo(x)[:, chosen] for x in trials]
+        pattern = undo(synchronizer.pattern_)[:, chosen]
+        lengths, ticks = [len(x) for x in trials], reached.keyframes
+        lasting = reached.facts.durations() if unit == "seconds" else None
+        lines = named_keyframes(synchronizer, reached.params.get("keyframes"))
+        axis = TimeAxis(
+            unit, len(pattern), lengths, lasting, xlabel, keyframes=lines, trial_keyframes=ticks
         )
-        chosen_names = [names[i] for i in chosen]
-        display.ylabels = labels_of_signals(chosen_names, known_units, units)
         index = index_of_pattern(synchronizer, trials)
-        pattern = "the pattern" if index is None else f"the pattern, trial {index}"
-        display.titles = ("as recorded", pattern)
-        if y is not None:
-            display.groups = names_of_groups(y, len(trials), name="y")
-        display.warps = bool(warps)
-        return display.plot(ax)
+        title = "the pattern" if index is None else f"the pattern, trial {index}"
+        return cls._of(
+            before=before,
+            after=match.warp(before),
+            match=match,
+            axis=axis,
+            ylabels=labels_of_signals([names[i] for i in chosen], known_units, units),
+            pattern=pattern,
+            titles=("as recorded", title),
+            groups=None if y is None else names_of_groups(y, len(trials), name="y"),
+            warps=bool(warps),
+        ).plot(ax)
 
     @property
     def doubtful(self) -> np.ndarray | None:

@@ -139,32 +139,32 @@ class TrackingDisplay(Display):
                 f"X must be one take, 2-D, got an array-like with {np.ndim(X)} axes: "
                 "of several takes give one."
             )
-        display = cls()
-        (display.track,) = estimator.track([X], None if times is None else [times])
-        poses = display.track.poses
+        (track,) = estimator.track([X], None if times is None else [times])
+        poses = track.poses
         n_frames, n_features = poses.shape
-        if truth is not None:
-            if np.shape(truth) != poses.shape:
-                raise ValueError(
-                    f"The truth must have the shape {poses.shape}, got {np.shape(truth)}."
-                )
-            display.truth = np.asarray(truth, dtype=np.float64)
+        if truth is not None and np.shape(truth) != poses.shape:
+            raise ValueError(f"The truth must have the shape {poses.shape}, got {np.shape(truth)}.")
         if names is None:
             names = names_of_features(None, estimator, n_features)
         names = as_names(names, n_features, "names", "features")
-        display.observed = np.asarray(X, dtype=np.float64)
+        observed = np.asarray(X, dtype=np.float64)
         if features is None:
-            hidden = np.isnan(display.observed).any(axis=0)
+            hidden = np.isnan(observed).any(axis=0)
             candidates = np.flatnonzero(hidden if hidden.any() else ~hidden)
             variance = np.var(poses[:, candidates], axis=0)
-            display.shown = candidates[np.argsort(-variance, kind="stable")][:_N_FEATURES].tolist()
+            shown = candidates[np.argsort(-variance, kind="stable")][:_N_FEATURES].tolist()
         else:
-            display.shown = choose_features(features, names)
-        display.times = times_from_zero(times, n_frames, estimator.frame_rate)
-        display.n_frames = estimator.n_frames_
-        display.names = labels_of_signals(names, units_of_columns(X), units)
-        display.xlabel = time_label(estimator.frame_rate)
-        return display.plot(ax)
+            shown = choose_features(features, names)
+        return cls._of(
+            track=track,
+            truth=None if truth is None else np.asarray(truth, dtype=np.float64),
+            observed=observed,
+            times=times_from_zero(times, n_frames, estimator.frame_rate),
+            n_frames=estimator.n_frames_,
+            names=labels_of_signals(names, units_of_columns(X), units),
+            shown=shown,
+            xlabel=time_label(estimator.frame_rate),
+        ).plot(ax)
 
     def _layout(self):
         count = len(self.shown) + 2

@@ -86,13 +86,13 @@ class TrellisDisplay(Display):
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
         synchronizer, trials = reached.synchronizer, reached.trials
-        display = cls()
-        display.space = synchronizer.disparity_space(trials, trial, **reached.params)
-        display.warp = reached.match().offsets[trial]
         index = index_of_pattern(synchronizer, trials)
         pattern = "pattern" if index is None else f"pattern {index}"
-        display.names = (pattern, f"trial {trial}")
-        return display.plot(ax)
+        return cls._of(
+            space=synchronizer.disparity_space(trials, trial, **reached.params),
+            warp=reached.match().offsets[trial],
+            names=(pattern, f"trial {trial}"),
+        ).plot(ax)
 
     def _layout(self):
         return [(0, 0)], (1, 1), (WIDTH, 4)

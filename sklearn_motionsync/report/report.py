@@ -481,29 +481,32 @@ def own_figures():
             plt.close(number)
 
 
-def draw_signals(trials, shown):
-    """Signals time-normalised and aligned, side by side, and the offsets of all trials.
+class SignalsDisplay(SynchronizationDisplay):
+    """Signals time-normalised and aligned, side by side, and the offsets of all trials."""
 
-    Parameters
-    ----------
-    trials : TrialSet
-    shown : list of int
-        The signals.
-    """
-    aligned, pattern = trials.aligned, trials.pattern
-    n_frames, n = len(aligned.clock), len(aligned.even)
-    lasting, reached = [aligned.clock[-1]] * n, aligned.reached
-    keyframes = named_keyframes(reached.synchronizer, reached.params.get("keyframes"))
-    display = SynchronizationDisplay()
-    display.match = aligned.match
-    display.before, after = list(aligned.even[:, :, shown]), aligned.curves[:, :, shown]
-    display.after = after
-    display.pattern = after.mean(axis=0) if pattern is None else after[pattern]
-    display.titles = ("time-normalised", "their mean" if pattern is None else "the pattern")
-    display.axis = TimeAxis(aligned.unit, n_frames, [n_frames] * n, lasting, keyframes=keyframes)
-    display.ylabels = [trials.signals[i] for i in shown]
-    if "group" in trials.design:
-        display.groups = list(map(str, trials.design["group"]))
-    display.plot()
+    @classmethod
+    def of_trials(cls, trials, shown):
+        """Draw the signals of a `TrialSet` that are shown, by their indices."""
+        aligned, pattern = trials.aligned, trials.pattern
+        n_frames, n = len(aligned.clock), len(aligned.even)
+        lasting, reached = [aligned.clock[-1]] * n, aligned.reached
+        keyframes = named_keyframes(reached.synchronizer, reached.params.get("keyframes"))
+        after = aligned.curves[:, :, shown]
+        return cls._of(
+            before=list(aligned.even[:, :, shown]),
+            after=after,
+            match=aligned.match,
+            axis=TimeAxis(aligned.unit, n_frames, [n_frames] * n, lasting, keyframes=keyframes),
+            ylabels=[trials.signals[i] for i in shown],
+            pattern=after.mean(axis=0) if pattern is None else after[pattern],
+            titles=("time-normalised", "their mean" if pattern is None else "the pattern"),
+            groups=list(map(str, trials.design["group"])) if "group" in trials.design else None,
+            warps=True,
+        ).plot()
+
+
+def draw_signals(trials, shown):
+    """The figure of a `SignalsDisplay`, with the label of its time under both columns."""
+    display = SignalsDisplay.of_trials(trials, shown)
     display.axes_[-3].set_xlabel(display.axes_[-2].get_xlabel())
     return display.figure_
