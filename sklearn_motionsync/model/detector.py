@@ -124,7 +124,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
     Each gives the probability p of a deviation as large. Their score is
     ``sqrt(- log p_movement - 0.15 (log p_course + log p_duration + log p_energy))``, Fisher's
     combination with weights. Its limit is learnt from the scores of trials of people left out, and
-    reaches the two people who are farthest from the others. A trial is also refused if one test
+    reaches the two people farthest from the others. A trial is also refused if one test
     alone is one and a half times beyond its limit.
 
     Where the movement clearly differs from an image of itself, a trial that is more like the image
