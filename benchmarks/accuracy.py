@@ -1,13 +1,13 @@
 """How accurate: key moments of real people, known warps and true key-frames.
 
     pip install . tslearn fdasrsf affinewarp
-    python benchmarks/accuracy.py DATA_FOLDER [people] [known-warps] [bends] [--peers]
+    python benchmarks/accuracy.py DATA_FOLDER [people] [unseen] [known-warps] [bends] [peers]
 
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form. *People*
 has the key moments of harness.py in three ways: of people held out, of all ordered pairs, and on
-one common time line of a fit with the median pattern. ``--peers`` puts the sets on a common time
-line with other packages, too: they are fed poses and velocities (smoothed over 3 % of the clip),
-and every setting is shown, where ours have one for all. Prints Markdown.
+one common time line of a fit with the median pattern. *Peers* puts the sets on a common time line
+with other packages: they are fed poses and velocities (smoothed over 3 % of the clip), and every
+setting is shown, where ours have one for all. Prints Markdown.
 """
 
 import sys
@@ -228,16 +228,9 @@ TABLES = {
     "unseen": unseen_table,
     "known-warps": known_table,
     "bends": bending_table,
+    "peers": peer_table,
 }
 
-
-def prepare(options):
-    if options.peers:
-        TABLES["peers"] = peer_table
-    print_versions(*dict.fromkeys(name for name, *_ in peers.TIME_LINES.values()))
-
-
 if __name__ == "__main__":
-    command = command_line(__doc__)
-    command.add_argument("--peers", action="store_true", help="other packages, too")
-    run_tables(TABLES, command, prepare)
+    print_versions(*dict.fromkeys(name for name, *_ in peers.TIME_LINES.values()))
+    run_tables(TABLES, command_line(__doc__))

@@ -550,10 +550,10 @@ def run_tables(tables, parser, prepare=None):
     """
     parser.add_argument("tables", nargs="*", help=f"some of {', '.join(tables)}; by default all")
     options = parser.parse_args()
+    if prepare is not None:
+        prepare(options)
     unknown = set(options.tables) - set(tables)
     if unknown:
         parser.error(f"there is no table {', '.join(sorted(unknown))}")
-    if prepare is not None:
-        prepare(options)
     for name in options.tables or tables:
         tables[name](options.folder)
