@@ -57,7 +57,7 @@ def study(seed, n_people, n_strides, n_cycles):
     for k, kind in enumerate(KINDS):
         trials, subjects = new_people(kind, n_cycles, 1000 + len(KINDS) * seed + k)
         groups = ["norm"] * len(data) + ["new"] * len(trials)
-        given = {"norm": "norm", "people": people + subjects, "level": 0.1}
+        given = {"norm": "norm", "groups": people + subjects, "level": 0.1}
         found = compare_to_norm(pipe, data + trials, groups, **given)
         counts = found.departures.groupby("subject").size()
         rows.append([100 * found.verdicts["differs"].mean(), counts.max(), counts.mean()])
@@ -87,7 +87,7 @@ def people(folder):
                 new = [own, *late, [trials[i] for i in bad[:count]]]
                 X = [trials[i] for i in norm] + [x for some in new for x in some]
                 kind = [name for name, some in zip(kinds, new, strict=True) for _ in some]
-                given = {"norm": "norm", "people": actors[norm].tolist() + kind, "level": 0.1}
+                given = {"norm": "norm", "groups": actors[norm].tolist() + kind, "level": 0.1}
                 found = compare_to_norm(pipe, X, ["norm"] * len(norm) + kind, **given)
                 rows[name][k] += found.verdicts["differs"].reindex(kinds).to_numpy(dtype=float)
         rows[name] *= 100 / len(np.unique(actors))
