@@ -6,7 +6,8 @@ Errors are milliseconds; an event farther off than 150 ms is missed. *People*: t
 jogs and CMU's walks at a lower frame rate and with noise, against those of the recordings as they
 are. *Files*: C3D files whose events name strikes and foot-offs, such as those of force plates, with
 markers whose names `Skeleton.from_frame` knows. Their heels and toes are left out once, and the
-rule of Zeni and others is run beside. *Refused*: people that exercise on the spot have no events.
+rule of Zeni and others is run beside. *Refused*: exercises on the spot; but for lunges, none is to
+have an event. Prints Markdown.
 """
 
 import warnings

@@ -27,6 +27,7 @@ from harness import (
     P,
     at_frames,
     command_line,
+    percent,
     print_head,
     print_row,
     read_actions,
@@ -305,9 +306,9 @@ def _with_gap(x, rng):
 
 
 def inside(lower, upper, truth):
-    """Per cent of the truths that are inside, NaN of unknown ones, and the mean width."""
+    """The share of the truths that are inside, NaN of unknown ones, and the mean width."""
     held = (lower <= truth + 1e-9) & (truth <= upper + 1e-9)
-    return 100 * np.where(np.isnan(truth), np.nan, held).mean(), np.mean(upper - lower)
+    return np.where(np.isnan(truth), np.nan, held).mean(), np.mean(upper - lower)
 
 
 def interval_table(folder):
@@ -320,10 +321,10 @@ def interval_table(folder):
                     rows = found.setdefault(condition, {}).setdefault(action, [])
                     for live, truth in zip(fold.online.track(clips), truths, strict=True):
                         rows.append(inside(live.lower, live.upper, truth))
-        print_head(f"intervals, {name}", ["inside", "mean width"])
+        print_head(f"intervals, {name}", ["inside, %", "mean width"])
         for condition, by_action in found.items():
             held, width = np.mean([np.mean(rows, axis=0) for rows in by_action.values()], axis=0)
-            print_row(condition, [f"{held:.0f}", f"{width:.1f}"])
+            print_row(condition, [percent(held), f"{width:.1f}"])
 
 
 if __name__ == "__main__":
