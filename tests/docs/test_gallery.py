@@ -1,6 +1,7 @@
 """The examples of the gallery run."""
 
 import runpy
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -15,6 +16,7 @@ def test_a_page_of_the_gallery_runs_and_draws(script, tmp_path, monkeypatch):
         pytest.importorskip("spm1d")
     # Some write their figures to the folder in which they run.
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(script)])
     plt.close("all")
     runpy.run_path(str(script), run_name="__main__")
     assert plt.get_fignums()
