@@ -1,11 +1,12 @@
 """Cycles of real people: their period against foot geometry, and where a recording repeats.
 
-    python benchmarks/cycles.py DATA_FOLDER [single] [several] [standing] [joined] [gestures]
+    python benchmarks/cycles.py DATA_FOLDER [periods] [single] [several] [standing]
+        [joined] [gestures]
 
-A foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such a maximum
-stands out by 0.3 of the whole swing. A step is the time from one strike to the next, of either
-foot. A period is held against twice the median step: the jogs begin from standing, and their first
-stride is longer. *Single* actions are not to be cyclic.
+*Periods*: a foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such
+a maximum stands out by 0.3 of the whole swing. A step is the time from one strike to the next, of
+either foot. A period is held against twice the median step: the jogs begin from standing, and their
+first stride is longer. *Single* actions are not to be cyclic.
 
 *Several* cycles fit where every second or fourth repetition differs: exercises of UI-PRMD, chained
 from repetitions of one person, some of them done wrong. A period is right within 10 % of the mean
@@ -20,19 +21,12 @@ a cut is inside alike. *Joined* are single actions, with a jog in the middle. A 
 take is found if more than half of a stretch lies within its label. Prints Markdown.
 """
 
+import copy
+import functools
 from pathlib import Path
 
 import numpy as np
-from harness import (
-    ahead,
-    at_frames,
-    command_line,
-    print_head,
-    print_row,
-    read_takes,
-    run_tables,
-    vertex,
-)
+from harness import at_frames, command_line, print_head, print_row, run_tables, vertex
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn_motionsync.datasets import load_trials
@@ -56,26 +50,44 @@ CHAIN, EVERY, DRAWS = 12, (0, 2, 4), 3
 GESTURES = ("waveHands", "clapHands")
 # Seconds of the turn to a pose of standing, and of the filter of the sway; sway and noise in m.
 TURN, SLOW, SWAY, NOISE = 0.5, 0.25, 0.01, 0.001
-# So many times as much standing, of what kind, and frames a second where they are not the own.
-STANDING = [(0, "freeze", None), (1, "freeze", None), (4, "freeze", None)]
-STANDING += [(1, "sway", None), (4, "sway", None), (4, "noise", None)]
-STANDING += [(2, "sway", 120), (2, "sway", 25), (2, "noise", 120), (2, "noise", 25)]
 
 
 # -- cycles -----------------------------------------------------------------------------
 
 
+def read(folder, archive, label):
+    """The takes of an action: positions, actors, frames a second, skeleton."""
+    bunch = copy.copy(_load(Path(folder) / archive / f"{archive}_positions.npz"))
+    # Of fewer than 8 frames nothing can be said.
+    chosen = [i for i in np.flatnonzero(bunch.target == label) if len(bunch.data[i]) >= 8]
+    bunch.data = [bunch.data[i] for i in chosen]
+    bunch.actor, bunch.take = bunch.actor[chosen], bunch.take[chosen]
+    bunch.frame_rate = bunch.frame_rate[chosen]
+    return bunch
+
+
+@functools.cache
+def _load(path):
+    return load_trials(path)
+
+
 def foot_strikes(positions, skeleton, frame_rate):
     """Frames, with fractions, in which the left and the right ankle are farthest ahead."""
     points = np.asarray(positions, dtype=float).reshape(len(positions), -1, 3)
-    names = ("pelvis", "left_hip", "right_hip", "left_ankle", "right_ankle")
-    at = {name.replace("_", " "): points[:, skeleton.index_of(name)] for name in names}
-    strikes, apart = [], max(1, int(APART * frame_rate))
-    for ankle in ("left ankle", "right ankle"):
-        way = ahead(at, at[ankle] - at["pelvis"])
-        way = gaussian_filter1d(way, SMOOTHING * frame_rate, mode="nearest")
-        k, _ = find_peaks(way, prominence=0.3 * np.ptp(way), distance=apart)
-        strikes.append(np.array([vertex(way, frame) for frame in k]))
+
+    def at(landmark):
+        return points[:, skeleton.index_of(landmark)]
+
+    across = (at("left_hip") - at("right_hip")) * [1, 0, 1]
+    forward = np.cross(across, [0, 1, 0])
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    strikes = []
+    for side in ("left", "right"):
+        ahead = ((at(f"{side}_ankle") - at("pelvis")) * forward).sum(axis=1)
+        ahead = gaussian_filter1d(ahead, SMOOTHING * frame_rate, mode="nearest")
+        apart = max(1, int(APART * frame_rate))
+        k, _ = find_peaks(ahead, prominence=0.3 * np.ptp(ahead), distance=apart)
+        strikes.append(np.array([vertex(ahead, frame) for frame in k]))
     return strikes
 
 
@@ -132,7 +144,7 @@ def several_fit(pairs, segmenter=None, every=0):
 def warnings_of(folder):
     """Names of sets of takes, and what `several_fit` counts."""
     for names in CYCLIC.items():
-        bunch = read_takes(folder, *names)
+        bunch = read(folder, *names)
         segmenter = CycleSegmenter(bunch.skeleton)
         periods = segmenter.report(bunch.data)["period"]
         yield names[1], several_fit(zip(bunch.data, periods, strict=True), segmenter)
@@ -193,10 +205,10 @@ def with_standing(walk, factor, kind, rng):
 def walks(folder):
     """Walks and jogs, each with a pose of standing, and the unit of a metre."""
     for archive, label in CYCLIC.items():
-        bunch = read_takes(folder, archive, label)
+        bunch = read(folder, archive, label)
         poses = {}
         if archive == "hdm05":
-            bends = read_takes(folder, archive, "depositFloorR")
+            bends = read(folder, archive, "depositFloorR")
             poses = {actor: x[0] for x, actor in zip(bends.data, bends.actor, strict=True)}
         groups = bunch.actor if len(set(bunch.actor)) > 1 else np.arange(len(bunch.data))
         for x, rate, actor, group in zip(
@@ -218,9 +230,9 @@ def walks(folder):
             }
 
 
-def standing(every, factor, kind, rate):
-    """Counts of walks: cyclic, right periods; of cycles, inside; of cuts, inside."""
-    rng, counts = np.random.default_rng(0), np.zeros(6, dtype=int)
+def standing(every, factor, kind, rate=None, seed=0):
+    """Counts of walks: cyclic, right periods; of cycles, inside; of cuts, inside; of stretches."""
+    rng, counts = np.random.default_rng(seed), np.zeros(7, dtype=int)
     for label in CYCLIC.values():
         own = [walk for walk in every if walk["label"] == label]
         takes, ends, periods = [], [], []
@@ -235,6 +247,8 @@ def standing(every, factor, kind, rate):
         report = CycleSegmenter(skeleton).report(takes)
         counts[0] += report["cyclic"].sum()
         counts[1] += (np.abs(report["period"] / periods - 1) < 0.05)[report["cyclic"]].sum()
+        if "stretches" in report:
+            counts[6] += report["stretches"].map(len).sum()
         groups = np.array([walk["group"] for walk in own])
         for group in np.unique(groups):
             test = np.flatnonzero(groups == group)
@@ -245,7 +259,7 @@ def standing(every, factor, kind, rate):
                 for i, row in zip(test[table["take"]], table.itertuples(), strict=True):
                     (first, last), cuts = ends[i], (row.start, row.stop - 1)
                     inside = [first - 1 <= cut <= last for cut in cuts]
-                    counts[2:] += [1, all(inside), 2, sum(inside)]
+                    counts[2:6] += [1, all(inside), 2, sum(inside)]
     return counts
 
 
@@ -265,15 +279,15 @@ def joined(clips, skeleton, rate=120, turn=0.4):
     return np.concatenate(parts).reshape(n, -1), places
 
 
-def among_actions(folder, n_actions, jogs):
+def among_actions(folder, n_actions, draws=24, jogs=False):
     """Takes of different single actions of a person, with a jog in the middle or none.
 
     Takes; called cyclic; with the jog found; stretches that are not half of the jog.
     """
     rng, counts = np.random.default_rng(n_actions), np.zeros(4, dtype=int)
-    actions = {label: read_takes(folder, "hdm05", label) for label in SINGLE["hdm05"]}
-    bunch = read_takes(folder, "hdm05", CYCLIC["hdm05"])
-    for k in range(len(bunch.data) if jogs else 24):
+    actions = {label: read(folder, "hdm05", label) for label in SINGLE["hdm05"]}
+    bunch = read(folder, "hdm05", CYCLIC["hdm05"])
+    for k in range(len(bunch.data) if jogs else draws):
         actor = bunch.actor[k] if jogs else rng.choice(np.unique(bunch.actor))
         labels = rng.choice(list(actions), n_actions, replace=False)
         clips = []
@@ -311,7 +325,7 @@ def gestures(folder):
                 right.add((numbers[take], start))
                 break
     for label in ("walk", *GESTURES):
-        clips = read_takes(folder, "utkinect", label)
+        clips = read(folder, "utkinect", label)
         report = CycleSegmenter(clips.skeleton).report(clips.data)
         yield label, len(report), int(report["cyclic"].sum()), n_labels[label], found.get(label, 0)
     others = sum(n for label, n in found.items() if label not in ("walk", *GESTURES))
@@ -321,11 +335,22 @@ def gestures(folder):
 # -- tables -----------------------------------------------------------------------------
 
 
+def period_table(folder):
+    for archive, label in CYCLIC.items():
+        bunch = read(folder, archive, label)
+        report = CycleSegmenter(bunch.skeleton).report(bunch.data)
+        print_head(label, ["period", "cycles", "error, %"])
+        pairs = zip(bunch.data, bunch.frame_rate, report.itertuples(), strict=True)
+        for k, (x, rate, row) in enumerate(pairs):
+            error = 100 * (row.period / period_of_strikes(x, bunch.skeleton, rate) - 1)
+            print_row(k, [f"{row.period:.1f}", f"{row.n_cycles:.2f}", f"{error:.1f}"])
+
+
 def single_table(folder):
     print_head("not to be cyclic", ["takes", "called cyclic", "highest strength"])
     for archive, labels in SINGLE.items():
         for label in labels:
-            bunch = read_takes(folder, archive, label)
+            bunch = read(folder, archive, label)
             report = CycleSegmenter(bunch.skeleton).report(bunch.data)
             counts = [len(report), report["cyclic"].sum()]
             print_row(label, [*map(str, counts), f"{report['strength'].max():.2f}"])
@@ -342,9 +367,13 @@ def several_table(folder):
 
 def standing_table(folder):
     every = list(walks(folder))
-    columns = ["cyclic", "period right", "cycles", "inside", "cuts", "cuts inside"]
+    columns = ["cyclic", "period right", "cycles", "inside", "cuts", "cuts inside", "stretches"]
     print_head(f"standing, {len(every)} walks", columns)
-    for factor, kind, rate in STANDING:
+    cases = [
+        (factor, kind, None) for kind in ("freeze", "sway", "noise") for factor in (0, 1, 2, 4)
+    ]
+    cases += [(2, kind, rate) for rate in (120, 60, 30, 25) for kind in ("sway", "noise")]
+    for factor, kind, rate in cases:
         name = f"{factor} x, {kind}" + (f", {rate} Hz" if rate else "")
         print_row(name, map(str, standing(every, factor, kind, rate)))
 
@@ -353,7 +382,7 @@ def joined_table(folder):
     print_head("joined single actions", ["takes", "cyclic", "jog found", "other stretches"])
     for n_actions in (2, 3, 4, 5):
         for jogs in (False, True):
-            counts = among_actions(folder, n_actions, jogs)
+            counts = among_actions(folder, n_actions, jogs=jogs)
             print_row(f"{n_actions} actions{' and a jog' if jogs else ''}", map(str, counts))
 
 
@@ -364,6 +393,7 @@ def gesture_table(folder):
 
 
 TABLES = {
+    "periods": period_table,
     "single": single_table,
     "several": several_table,
     "standing": standing_table,
