@@ -431,25 +431,28 @@ def enhanced(deviates):
     if deviates.shape[1] == 1:
         return deviates
     n, n_frames, n_features = deviates.shape
-    # A column for each curve and sign.
-    signed = np.concatenate([deviates, -deviates]).astype(np.float32)
-    curves = signed.transpose(1, 0, 2).reshape(n_frames, -1)
-    total, columns, height = np.zeros_like(curves), np.arange(curves.shape[1]), 0.0
+    # A row for each curve and sign, and a frame behind it in which every run has ended.
+    signed = np.concatenate([deviates, -deviates]).transpose(0, 2, 1).reshape(-1, n_frames)
+    rows = np.full((len(signed), n_frames + 1), -np.inf, dtype=np.float32)
+    rows[:, :-1] = signed
+    is_positive, numbers, changes = rows >= _STEP, np.arange(len(rows)), np.zeros(rows.size)
+    width, height = n_frames + 1, 0.0
     while True:
         height += _STEP
-        high = curves.max(axis=0) >= height
+        high = rows.max(axis=1) >= height
         if not high.any():
             break
-        curves, columns = curves[:, high], columns[high]
-        above, extent = curves >= height, np.zeros_like(curves)
-        # Frames since the last one below, and then the largest of each run.
-        run = np.zeros(len(columns), dtype=np.float32)
-        for is_above, out in zip(above, extent, strict=True):
-            run = np.multiply(run + 1, is_above, out=out)
-        for is_above, out in zip(above[::-1], extent[::-1], strict=True):
-            run = np.multiply(np.maximum(run, out), is_above, out=out)
-        total[:, columns] += extent**_EXTENT * (height**_HEIGHT * _STEP)
-    higher, lower = total.reshape(n_frames, 2, n, n_features).transpose(1, 2, 0, 3)
+        rows, numbers = rows[high], numbers[high]
+        # Where runs of frames begin, and the first frames after them.
+        edges = np.flatnonzero(np.diff((rows >= height).ravel(), prepend=False))
+        row, frame = np.divmod(edges, width)
+        places = numbers[row] * width + frame
+        first, after = places[::2], places[1::2]
+        weights = (after - first) ** _EXTENT * (height**_HEIGHT * _STEP)
+        changes[first] += weights
+        changes[after] -= weights
+    total = np.cumsum(changes.reshape(-1, width), axis=1) * is_positive
+    higher, lower = total[:, :-1].reshape(2, n, n_features, n_frames).transpose(0, 1, 3, 2)
     return higher - lower
 
 
