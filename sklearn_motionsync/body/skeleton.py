@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
@@ -30,22 +31,6 @@ from .limbs import LIMBS, complete_legs, features_of_parts, landmark_positions, 
 _STILL = 1e-4
 # Limbs are crossed in this share of frames if sides are exchanged; people cross them for less.
 _CROSSED = 0.95
-
-
-class _ReadOnly(dict):
-    """A dict that cannot be changed, so that the skeleton that holds it can be hashed."""
-
-    def _refuse(self, *args, **kwargs):
-        raise TypeError("The landmarks of a skeleton cannot be changed: make another skeleton.")
-
-    __setitem__ = __delitem__ = __ior__ = _refuse
-    clear = pop = popitem = setdefault = update = _refuse
-
-    def __hash__(self):
-        return hash(frozenset(self.items()))
-
-    def __reduce__(self):
-        return type(self), (dict(self),)
 
 
 class _Constructor(Protocol):
@@ -154,7 +139,7 @@ class Skeleton:
                 f"A skeleton needs different joint names and one parent each, got {len(joints)} "
                 f"names ({len(set(joints))} different) and {len(parents)} parents."
             )
-        if any(not -1 <= p < len(joints) or p == i for i, p in enumerate(parents)):
+        if any(not -1 <= p < len(joints) for p in parents):
             raise ValueError(f"parents must be other joints' indices, or -1; got {parents}.")
         if cycle := find_cycle(parents):
             raise ValueError(
@@ -180,13 +165,17 @@ class Skeleton:
         object.__setattr__(self, "n_dims", int(self.n_dims))
         object.__setattr__(self, "landmarks", _check_landmarks(landmarks, named, joints))
 
+    def __hash__(self):
+        landmarks = frozenset(self.landmarks.items())
+        return hash((self.joints, self.parents, landmarks, self.up, self.n_dims))
+
     # In files the landmarks are a plain dict.
 
     def __getstate__(self):
         return self.__dict__ | {"landmarks": dict(self.landmarks)}
 
     def __setstate__(self, state):
-        self.__dict__.update(state, landmarks=_ReadOnly(state["landmarks"]))
+        self.__dict__.update(state, landmarks=MappingProxyType(state["landmarks"]))
 
     def __repr__(self):
         for name in FORMATS:
@@ -504,17 +493,11 @@ def _as_joints(joints):
 def _as_parents(parents):
     """Indices as a tuple of int."""
     listed = _as_sequence(parents)
-    if listed is None:
+    if listed is None or not all(map(is_integer, listed)):
         raise ValueError(
-            "parents must be a list, the index of each joint's parent or -1; got "
-            f"{type(parents).__name__}."
+            "parents must be a list of whole numbers, the index of each joint's parent or -1; got "
+            f"{parents!r:.200}."
         )
-    for j, parent in enumerate(listed):
-        if not is_integer(parent):
-            raise ValueError(
-                "parents must be whole numbers, the index of each joint's parent or -1; got "
-                f"{parent!r} for joint {j}."
-            )
     return tuple(map(int, listed))
 
 
@@ -534,20 +517,18 @@ def _as_landmarks(landmarks):
         )
     if unknown := sorted(str(name) for name in landmarks if name not in LANDMARKS):
         raise ValueError(f"landmarks must be among {LANDMARKS}, got {unknown}.")
-    return {name: _as_landmark(name, at) for name, at in landmarks.items()}
-
-
-def _as_landmark(landmark, at):
-    if at is None:
-        return None
-    joints = (at,) if isinstance(at, str) else _as_sequence(at)
-    are_names = joints and all(isinstance(joint, str) for joint in joints)
-    if not are_names or len(set(joints)) < len(joints):
-        raise ValueError(
-            f"The landmark {landmark!r} must be a joint's name, a tuple of different names for "
-            f"their mean, or None where it is missing; got {at!r}."
-        )
-    return str(joints[0]) if len(joints) == 1 else tuple(map(str, joints))
+    joints_of = {}
+    for name, at in landmarks.items():
+        joints = (at,) if isinstance(at, str) else _as_sequence(at)
+        are_names = joints and all(isinstance(joint, str) for joint in joints)
+        if at is not None and (not are_names or len(set(joints)) < len(joints)):
+            raise ValueError(
+                f"The landmark {name!r} must be a joint's name, a tuple of different names for "
+                f"their mean, or None where it is missing; got {at!r}."
+            )
+        joints = joints and tuple(map(str, joints))
+        joints_of[name] = joints[0] if joints and len(joints) == 1 else joints
+    return joints_of
 
 
 def _check_landmarks(landmarks, named, joints):
@@ -570,7 +551,7 @@ def _check_landmarks(landmarks, named, joints):
             "{'pelvis': ('LASI', 'RASI')}. A landmark that the body lacks is None; both ends "
             f"of one limb must be there.{nearest}"
         )
-    return _ReadOnly(there)
+    return MappingProxyType(there)
 
 
 def find_cycle(parents):

@@ -1,6 +1,5 @@
 """Trials from archives of joint positions (``*_positions.npz``)."""
 
-import sys
 import zipfile
 from pathlib import Path as FilePath
 
@@ -13,8 +12,17 @@ from ..inputs.types import Path
 from ..io.text import FARTHEST, check_result_size
 from ..matching.sizes import RATES
 
-_NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "parents")
-_TEXTS = ("label", "actor", "take", "joints")
+# The kinds of the dtype of each array, in words, and its shape: N trials, F frames, and joints.
+_FIELDS = {
+    "positions": ("f", "floats", "F, joints, 3"),
+    "offsets": ("iu", "whole numbers", "N + 1"),
+    "label": ("USiu", "text", "N"),
+    "actor": ("USiu", "text", "N"),
+    "take": ("USiu", "text", "N"),
+    "fps": ("iuf", "numbers", "N"),
+    "joints": ("US", "text", "joints"),
+    "parents": ("iuf", "numbers", "joints"),
+}
 
 
 def load_trials(path: Path) -> Bunch:
@@ -70,21 +78,34 @@ def load_trials(path: Path) -> Bunch:
     if not path.is_file():
         raise FileNotFoundError(f"There is no archive at {path}; give the path of a .npz file.")
     fields = _read_arrays(path)
-    positions, offsets = _check_positions(path, fields)
-    texts = {name: _check_texts(path, name, fields[name]) for name in _TEXTS}
-    joints = texts["joints"].tolist()
-    parents = _check_parents(path, fields["parents"], joints)
-    fps = fields["fps"]
-    if fps.dtype.kind not in "iuf" or ((fps < RATES[0]) | (fps > RATES[1])).any():
+    _check_fields(path, fields)
+    texts = {
+        name: _as_text(path, name, x) for name, x in fields.items() if _FIELDS[name][1] == "text"
+    }
+    joints, fps = texts["joints"].tolist(), fields["fps"]
+    if len(set(joints)) < len(joints):
+        raise ValueError(
+            f"{path}: joints must have different names, got {_quote(texts['joints'])}."
+        )
+    parents = fields["parents"]
+    valid = (parents == np.trunc(parents)) & (parents >= -1) & (parents < len(parents))
+    if not valid.all() or find_cycle(parents.astype(int).tolist()):
+        raise ValueError(
+            f"{path}: parents must be indices of joints, whole numbers from 0 to "
+            f"{len(parents) - 1}, or -1 for a root, to which they lead in no cycle, got "
+            f"{_quote(parents)}."
+        )
+    if ((fps < RATES[0]) | (fps > RATES[1])).any():
         raise ValueError(
             f"{path}: fps must be frames per second, above 0, or NaN if it is not known, got "
             f"{_quote(fps)}."
         )
     try:
-        skeleton = Skeleton(joints, parents)
+        skeleton = Skeleton(joints, parents.astype(int).tolist())
     except ValueError:
         skeleton = None
-    data = np.split(positions.reshape(len(positions), -1), offsets[1:-1])
+    positions = fields["positions"]
+    data = np.split(positions.reshape(len(positions), -1), fields["offsets"].astype(np.int64)[1:-1])
     columns = [f"{joint}_{axis}" for joint in joints for axis in "xyz"]
     for i, x in enumerate(data):
         check_finite(x, f"{path}: trial {i}, frame", columns)
@@ -106,72 +127,39 @@ def load_trials(path: Path) -> Bunch:
     )
 
 
-def _check_positions(path, fields):
-    """Positions and offsets; all other fields have the shapes that go with them."""
-    if missing := [name for name in _NEEDED if name not in fields]:
-        raise ValueError(f"{path} lacks {missing}; an archive of trials holds {_NEEDED}.")
-    positions, offsets = fields["positions"], fields["offsets"]
-    if positions.dtype.kind != "f" or positions.shape[2:] != (3,) or not positions.shape[1]:
-        raise ValueError(
-            f"{path}: positions must be floats of shape (frames, joints, 3), got "
-            f"{positions.dtype} {positions.shape}."
-        )
-    if offsets.ndim != 1 or len(offsets) < 2 or offsets.dtype.kind not in "iu":
-        raise ValueError(
-            f"{path}: offsets must be N + 1 whole numbers, got {offsets.dtype} {offsets.shape}."
-        )
+def _check_fields(path, fields):
+    """Refuse arrays of another kind or shape, and offsets that do not divide the frames."""
+    if missing := [name for name in _FIELDS if name not in fields]:
+        raise ValueError(f"{path} lacks {missing}; an archive of trials holds {[*_FIELDS]}.")
+    n_trials = fields["offsets"].size - 1
+    n_frames, n_joints = (*fields["positions"].shape, 0, 0)[:2]
+    sizes = {"F": n_frames, "joints": n_joints, "3": 3, "N": n_trials, "N + 1": n_trials + 1}
+    for name, (kinds, words, shape) in _FIELDS.items():
+        x, expected = fields[name], tuple(sizes[size] for size in shape.split(", "))
+        if x.dtype.kind not in kinds or x.shape != expected or not x.size:
+            raise ValueError(
+                f"{path}: {name} must be {words} of the shape ({shape}), with {n_trials} trials, "
+                f"{n_frames} frames and {n_joints} joints, got {x.dtype} {x.shape}."
+            )
     # Differences of unsigned numbers are never negative.
-    offsets = offsets.astype(np.int64)
-    n_frames, lengths = len(positions), np.diff(offsets)
+    offsets = fields["offsets"].astype(np.int64)
+    lengths = np.diff(offsets)
     bad = (lengths < 2) | (lengths > n_frames)
     if offsets[0] != 0 or offsets[-1] != n_frames or bad.any():
         raise ValueError(
             f"{path}: offsets must increase from 0 to the {n_frames} frames of positions, by at "
             f"least 2 for each trial, got {_quote(offsets)}."
         )
-    sizes = dict.fromkeys(("label", "actor", "take", "fps"), len(lengths))
-    sizes |= dict.fromkeys(("joints", "parents"), positions.shape[1])
-    for name, size in sizes.items():
-        if fields[name].shape != (size,):
-            raise ValueError(f"{path}: {name} must have shape ({size},), got {fields[name].shape}.")
-    return positions, offsets
 
 
-def _check_texts(path, name, values):
-    """Text; labels, actors and takes may also be whole numbers."""
-    kinds = "US" if name == "joints" else "USiu"
-    if values.dtype.kind not in kinds:
-        raise ValueError(f"{path}: {name} must be text, got {values.dtype}.")
+def _as_text(path, name, values):
     try:
-        if values.dtype.kind == "S":
-            values = np.char.decode(values, "utf-8")
-        values = values.astype(str)
-        # NumPy and Python accept code points beyond the last character.
-        if values.view(np.uint32).max() > sys.maxunicode:
-            raise ValueError
-        "".join(values.tolist()).encode()
-    except ValueError as error:
+        texts = np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values.astype(str)
+        # NumPy accepts code points that are no characters, and beyond the last one.
+        "".join(map(chr, texts.view(np.uint32))).encode()
+    except (ValueError, OverflowError) as error:
         raise ValueError(f"{path}: {name} must be text, got other bytes.") from error
-    if name == "joints" and len(set(values.tolist())) < len(values):
-        raise ValueError(f"{path}: joints must have different names, got {_quote(values)}.")
-    return values
-
-
-def _check_parents(path, parents, joints):
-    n = len(joints)
-    whole = parents.dtype.kind in "iuf" and (parents == np.trunc(parents)).all()
-    if not whole or (parents < -1).any() or (parents >= n).any():
-        raise ValueError(
-            f"{path}: parents must be indices of joints, whole numbers from 0 to {n - 1}, or -1 "
-            f"for a root, got {_quote(parents)}."
-        )
-    parents = parents.astype(int)
-    if cycle := find_cycle(parents.tolist()):
-        raise ValueError(
-            f"{path}: parents must lead to a root (-1), but from joint {joints[cycle[0]][:40]!r} "
-            f"they form a cycle, got {_quote(parents)}."
-        )
-    return parents.tolist()
+    return texts
 
 
 def _quote(values):
@@ -180,14 +168,14 @@ def _quote(values):
 
 
 def _read_arrays(path):
-    """The arrays of `_NEEDED` that the archive has, by name; their size is checked before."""
+    """The arrays of `_FIELDS` that the archive has, by name; their size is checked before."""
     try:
         with zipfile.ZipFile(path) as archive:
             n_bytes = sum(member.file_size for member in archive.infolist())
         check_result_size(path, path.stat().st_size, n_bytes, "the arrays")
         with np.load(path) as archive:
             # What is no array is read as bytes.
-            arrays = {name: np.asarray(archive[name]) for name in _NEEDED if name in archive}
+            arrays = {name: np.asarray(archive[name]) for name in _FIELDS if name in archive}
     except Exception as error:  # of zipfile, zlib, tokenize, ast, struct: any byte may be wrong
         if isinstance(error, ValueError) and str(error).startswith(f"{path}: "):
             raise

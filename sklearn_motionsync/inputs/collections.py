@@ -320,15 +320,6 @@ def as_source(X):
     return _Source(X, first) if first is None or _depth(first) >= 2 else None
 
 
-def gives_rows(X):
-    """Whether what is no list and no array gives the rows of a matrix by index."""
-    if not _has_items(X):
-        return False
-    if hasattr(X, "__array__"):
-        return getattr(X, "ndim", 0) == 2
-    return len(X) > 0 and _depth(X[0]) == 1
-
-
 def _has_no_order(X):
     """Whether an object gives neither the number of its items nor an item by its number."""
     if isinstance(X, pd.Series):

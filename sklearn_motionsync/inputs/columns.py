@@ -55,10 +55,8 @@ class JointColumns(NamedTuple):
         The column of each axis of each joint.
     confidence : list of int
         The column that tells how sure each joint is, -1 where there is none.
-    quality : list of int
-        All columns of the joints' confidence, errors and the like.
     rest : list of int
-        All other columns.
+        All columns but those of positions, and of their confidence, errors and the like.
     subjects : list of str
         The subject of each joint, where labels are tuples that name several; else "".
     units : str or None
@@ -69,7 +67,6 @@ class JointColumns(NamedTuple):
     axes: str
     places: np.ndarray
     confidence: list
-    quality: list
     rest: list
     subjects: list
     units: str | None
@@ -163,14 +160,13 @@ def _best(spellings, any_vector):
         joints = [_POSITION.sub("", joint) for joint in joints]
     places = np.array([[t[axis] for axis in axes] for t in columns.values()], dtype=np.int64)
     qualities = [{k: t[k] for k in t if k not in "xyz"} for t in columns.values()]
-    quality = sorted(place for t in qualities for place in t.values())
+    quality = [place for t in qualities for place in t.values()]
     units = {splits[place][2] for place in places.flat}
     return JointColumns(
         joints,
         axes,
         places,
         [min(map(_rank, t.items()), default=(0, -1))[1] for t in qualities],
-        quality,
         sorted(set(range(len(splits))).difference(places.flat, quality)),
         [subject for subject, *_ in columns],
         units.pop() or None if len(units) == 1 else None,

@@ -101,7 +101,7 @@ def refuse_non_numeric(values, what):
     Parameters and errors are those of `as_numbers`.
     """
     if issparse(values):
-        raise TypeError(f"{what} is a sparse matrix; use x.toarray().")
+        raise TypeError(f"{what} is a sparse matrix; use x.toarray(), or sparse_output=False.")
     if _is_masked(values):
         raise ValueError(
             f"{what} has masked values: interpolate the gaps, or drop what has them; "

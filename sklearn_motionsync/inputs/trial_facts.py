@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from .collections import NOT_ONE, Trials, as_collection, as_source
 from .numbers import as_numbers
 from .recorded import frame_rate_of_rows
 from .resampling import as_frame_rates
-from .tables import INDEX_NAMES, index_of, labels_given, labels_of, name_trial
+from .tables import INDEX_NAMES, index_of, labels_of, name_trial
 from .wording import counted, within
 
 
@@ -74,11 +73,6 @@ class TrialFacts(NamedTuple):
             lengths, rates = list(map(len, sequences)), list(map(frame_rate_of_rows, sequences))
         elif is_plain:
             lengths, rates, labels, levels = X, [], list(range(len(X))), INDEX_NAMES
-            index = getattr(X, "index", None)
-            is_numbered = not isinstance(index, pd.Index) or isinstance(index, pd.RangeIndex)
-            if not is_numbered and index.is_unique:
-                labels, outer = labels_given(index)
-                levels = (*outer, levels[-1])
         else:
             raise ValueError(
                 f"{NOT_ONE} For univariate trials in rows give how many frames each has, "

@@ -1,11 +1,11 @@
 """Key-points that programs track in videos, and other tables of joints: text, HDF5, JSON, NPY."""
 
 import contextlib
-import importlib
 import io
 import json
 import math
 import re
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
@@ -59,8 +59,7 @@ def read_deeplabcut(path):
     if not head.startswith(_HDF5):
         n_header = 3 + (b"\nindividuals" in head)
         return _assemble(read_cells(path, n_header), frame=0, units="px")
-    _import_package("tables", path)
-    with naming(path, "is no table of DeepLabCut"):
+    with naming(path, "needs the package tables (pip install tables) and a table of DeepLabCut"):
         df = pd.read_hdf(path)
         table = df.set_axis(range(df.shape[1]), axis=1).reset_index(drop=True)
         table[df.shape[1]] = df.index.to_numpy()
@@ -71,8 +70,10 @@ def read_sleap(path):
     """What SLEAP writes for analysis, as text or HDF5."""
     if not path.read_bytes().startswith(_HDF5):
         return _assemble(read_cells(path), units="px")
-    h5py = _import_package("h5py", path)
-    with naming(path, "is no analysis of SLEAP"), h5py.File(path) as file:
+    with (
+        naming(path, "needs h5py (pip install h5py) and an analysis of SLEAP"),
+        import_module("h5py").File(path) as file,
+    ):
         nodes, names = ([decode(x) for x in file[f"{x}_names"][:]] for x in ("node", "track"))
         shape = file["tracks"].shape
         check_result_size(path, path.stat().st_size, 8 * math.prod(shape), f"tracks {shape}")
@@ -171,15 +172,6 @@ def is_sleap(path, head):
     """Whether a file is one of SLEAP by its columns, or the names in a file of HDF5."""
     is_hdf5 = head.startswith(_HDF5)
     return b"node_names" in path.read_bytes() if is_hdf5 else head.startswith(b"track,frame_idx,")
-
-
-def _import_package(package, path):
-    with contextlib.suppress(ImportError):
-        return importlib.import_module(package)
-    raise ValueError(
-        f"{path} is a file of HDF5, for which the package {package!r} is needed: pip install "
-        f"{package}. Or export a CSV file, which needs none."
-    )
 
 
 # -- tables with a column for each number, and names of the columns ------------------------------

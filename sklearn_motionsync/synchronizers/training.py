@@ -13,7 +13,6 @@ from ..inputs.collections import (
     as_collection,
     as_source,
     count_of,
-    gives_rows,
     select,
 )
 from ..inputs.numbers import as_numbers, check_finite, check_magnitude, check_names
@@ -83,7 +82,7 @@ def draw_sample(X, size, pattern, random_state):
         collection = X if X.index.nlevels == 1 else as_collection(X)
     elif collection is None:
         is_sequence = isinstance(X, (list, tuple)) or (isinstance(X, np.ndarray) and X.ndim > 0)
-        collection = X if is_sequence or gives_rows(X) else None
+        collection = X if is_sequence else None
     population = 0 if collection is None else count_of(collection)
     is_index = isinstance(pattern, Integral) and not isinstance(pattern, bool)
     if size >= population or (is_index and pattern >= population):

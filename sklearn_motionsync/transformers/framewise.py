@@ -6,7 +6,6 @@ from typing import Self
 
 import numpy as np
 import pandas as pd
-from scipy.sparse import issparse
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils import get_tags
 from sklearn.utils._param_validation import HasMethods
@@ -225,11 +224,6 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstim
         """The output of the transformer for a trial, checked: a row of numbers a frame."""
         what, n_frames = trials.called(i), len(trials[i])
         name = type(self.transformer).__name__
-        if issparse(rows):
-            raise TypeError(
-                f"{name} gives a sparse matrix, and frames are arrays: let it give arrays, "
-                "as by sparse_output=False, or sparse_threshold=0 of a ColumnTransformer."
-            )
         rows = as_numbers(rows, f"{what}, transformed by {name},")
         if rows.ndim != 2 or len(rows) != n_frames:
             raise ValueError(

@@ -130,12 +130,12 @@ def with_parents(**parents):
             for parents in (0, "0" * 15, np.array(0))
         ),
         *(
-            ((PAPER.joints, with_parents(head=parent)), "whole numbers.* for joint 2")
+            ((PAPER.joints, with_parents(head=parent)), "list of whole numbers, the index of each")
             for parent in (1.5, "1", True, np.nan, np.inf, None, np.ma.masked, 1j, [1])
         ),
         ((PAPER.joints, with_parents(pelvis=2)), r"cycle: pelvis > head > neck > pelvis\. The"),
         ((PAPER.joints, with_parents(neck=2)), "cycle: neck > head > neck"),
-        ((PAPER.joints, with_parents(head=2)), "other joints' indices, or -1"),
+        ((PAPER.joints, with_parents(head=2)), "cycle: head > head"),
     ],
 )
 def test_skeleton_refuses_wrong_arguments(arguments, message):
@@ -180,19 +180,8 @@ def test_copies_are_equal(skeleton):
         assert other == skeleton
         assert hash(other) == hash(skeleton)
         assert joblib.hash(other) == joblib.hash(skeleton)
-        with pytest.raises(TypeError, match="cannot be changed"):
+        with pytest.raises(TypeError, match="does not support item assignment"):
             other.landmarks["head"] = "neck"
-
-
-def test_landmarks_cannot_be_changed():
-    landmarks = Skeleton.paper().landmarks
-    pop, update = (lambda: landmarks.pop("head")), (lambda: landmarks.update(head="neck"))
-    for change in (pop, update, lambda: landmarks.__ior__({}), landmarks.clear):
-        with pytest.raises(TypeError, match="make another skeleton"):
-            change()
-    assert landmarks == PAPER.landmarks
-    assert landmarks | {"head": "x"} == {**PAPER.landmarks, "head": "x"}
-    assert pickle.loads(pickle.dumps(landmarks)) == copy.deepcopy(landmarks) == landmarks
 
 
 def test_a_root_that_stands_still_is_joined_to_nothing_that_moves():

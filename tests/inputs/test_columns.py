@@ -26,7 +26,6 @@ def test_joints_and_axes_of_every_spelling(spelling, axes, case):
         first = len(tails) * JOINTS.index(joint)
         expected = [1 + order.tolist().index(first + i) for i in range(len(tails))]
         assert [*found.places[k], found.confidence[k]] == expected[:-1]
-        assert set(expected[-2:]) <= set(found.quality)
     assert found.rest == [0, 1 + len(labels)]
     assert found.units == ("mm" if "mm" in spelling else None)
 
@@ -48,8 +47,8 @@ def test_joints_and_axes_of_every_spelling(spelling, axes, case):
 def test_joints_of_lists_of_columns(labels, joints):
     found = parse_columns(labels.split())
     assert found.joints == joints.split()
-    there = [*found.places.flat, *found.quality, *found.rest]
-    assert sorted(there) == list(range(len(labels.split())))
+    there = {*found.places.flat, *found.confidence, *found.rest} - {-1}
+    assert there == set(range(len(labels.split())))
 
 
 def test_labels_of_several_levels():
@@ -61,7 +60,7 @@ def test_labels_of_several_levels():
         assert (found.axes, found.joints) == ("xy", ["nose", "paw"] * (n // 2))
         assert found.subjects == (["m1", "m1", "m2", "m2"] if n == 4 else ["", ""])
         np.testing.assert_array_equal(found.places, 3 * np.arange(n)[:, None] + [1, 2])
-        assert found.confidence == found.quality == [3 * k + 3 for k in range(n)]
+        assert found.confidence == [3 * k + 3 for k in range(n)]
         assert found.rest == [0]
 
 
@@ -69,7 +68,7 @@ def test_of_several_qualities_the_best_is_the_confidence():
     found = parse_columns(
         ["a_x", "a_y", "a_presence", "a_visibility", "b_x", "b_y", "b_error", "c_x", "c_y"]
     )
-    assert (found.confidence, found.quality) == ([3, -1, -1], [2, 3, 6])
+    assert (found.confidence, found.rest) == ([3, -1, -1], [])
 
 
 @pytest.mark.parametrize(

@@ -44,19 +44,6 @@ class Files:
         return self.trials[i]
 
 
-class Rows(Files):
-    """A matrix on disk, such as that of HDF5."""
-
-    ndim = 2
-
-    @property
-    def shape(self):
-        return self.trials.shape
-
-    def __array__(self, dtype=None, copy=None):
-        raise AssertionError("All of it is read.")
-
-
 X = walks(16, 20)
 KINDS = {
     "double": X,
@@ -244,7 +231,7 @@ def test_sample_does_not_depend_on_the_kind_of_input():
         np.testing.assert_array_equal(sync.sample_, expected.sample_)
     rows = X[:, :, 0]
     expected = DenseSynchronizer(max_fit=9).fit(rows)
-    for given in (pd.DataFrame(rows), rows.tolist(), Files(rows), Rows(rows)):
+    for given in (pd.DataFrame(rows), rows.tolist()):
         sync = DenseSynchronizer(max_fit=9).fit(given)
         assert sync.pattern_.tobytes() == expected.pattern_.tobytes()
         np.testing.assert_array_equal(sync.sample_, expected.sample_)
