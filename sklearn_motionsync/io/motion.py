@@ -472,24 +472,19 @@ def check_frame_rate(frame_rate):
         raise ValueError(f"frame_rate must be frames a second, above 0, got {frame_rate!r}.")
 
 
-def describe_times(
-    name, times, *, stated=None, decimals=17, frame_rate=None, unit="s", may_be_thinned=False
-):
+def describe_times(name, times, *, stated=None, decimals=17, frame_rate=None, may_be_thinned=False):
     """The ``attrs`` of a recording that describe its times, which do not decrease.
 
-    ``frame_rate`` (None if it is not known), ``first_time`` where seconds are known, ``times``
-    where they are uneven. A rate that the file states counts where the times agree with it, as far
-    as the digits that they were written with allow. A ``frame_rate`` of the caller replaces
-    all others. Times in frames give no frame rate. With ``may_be_thinned`` every k-th frame of the
-    stated rate is no contradiction.
+    ``frame_rate`` (None if it is not known), ``first_time``, and ``times`` where they are uneven. A
+    rate that the file states counts where the times agree with it, as far as the digits that they
+    were written with allow. A ``frame_rate`` of the caller replaces all others. With
+    ``may_be_thinned`` every k-th frame of the stated rate is no contradiction.
 
     Warns, in the caller's caller, if times are uneven or contradict the stated rate, and no
     ``frame_rate`` is given.
     """
     rate, even = _estimate_frame_rate(times, decimals, stated)
-    facts = {"frame_rate": rate if unit == "s" else None}
-    if unit == "s" or frame_rate is not None:
-        facts["first_time"] = float(times[0] / (1 if unit == "s" else frame_rate))
+    facts = {"frame_rate": rate, "first_time": float(times[0])}
     if not even:
         facts["times"] = times.tolist()
     if frame_rate is not None:
@@ -498,7 +493,7 @@ def describe_times(
         steps = np.diff(times)
         warn(
             f"{name}: its times are uneven, in steps of {steps.min():.4g} to {steps.max():.4g} "
-            f"{unit}, but frames count as evenly spaced. df.attrs['times'] holds them; "
+            "s, but frames count as evenly spaced. df.attrs['times'] holds them; "
             "to_trials(df.assign(time=df.attrs['times']), time='time') makes them even. If they "
             "are even in truth, give frame_rate=."
         )

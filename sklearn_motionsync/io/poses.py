@@ -106,7 +106,7 @@ def from_poses(
         _, confidence = _arrange(confidence, "confidence", _DIMENSIONS[:3])
         confidence = np.broadcast_to(confidence, values.shape[:3])
     joints = make_unique(_read_names(position, "keypoint"))
-    times, unit, fps = _read_times(position, attrs)
+    times, fps = _read_times(position, attrs, frame_rate)
     motion = {
         "frame_rate": fps,
         "units": None,
@@ -116,7 +116,7 @@ def from_poses(
         "times": times,
         "decimals": 17,
     }
-    set_clock(motion, "The poses", frame_rate, unit=unit, may_be_thinned=True)
+    set_clock(motion, "The poses", frame_rate, may_be_thinned=True)
     recordings, options = [], {"max_gap": max_gap, "min_confidence": min_confidence}
     for i, individual in enumerate(_read_names(position, "individual")):
         motion["positions"] = values[:, i]
@@ -187,11 +187,11 @@ def _read_axes(position):
     return axes
 
 
-def _read_times(position, attrs):
-    """The times or None, their unit ("s" or "frames"), and the frame rate of ``attrs`` or None."""
+def _read_times(position, attrs, frame_rate):
+    """The times in seconds, and the frame rate of ``attrs``; None of what is not known."""
     fps = read_rate(attrs.get("fps"))
     if "time" not in position.coords:
-        return None, None, fps
+        return None, fps
     values = position.coords["time"].values
     unit = "seconds" if values.dtype.kind in "mM" else attrs.get("time_unit")
     times = times_as_numbers(values, "The coordinate 'time' of poses")
@@ -201,11 +201,12 @@ def _read_times(position, attrs):
         unit = "frames" if (times == np.round(times)).all() else "seconds"
     word = str(unit).lower()
     if word.startswith("frame"):
-        return (times, "frames", None) if fps is None else (times / fps, "s", fps)
+        rate = frame_rate if fps is None else fps
+        return None if rate is None else times / rate, fps
     if word not in ("s", "sec", "second", "seconds"):
         raise ValueError(
             f"The times of poses must be seconds or frames, but attrs['time_unit'] is {unit!r}. "
             "Change them, as in ds.assign_coords(time=ds.time / 1000).assign_attrs("
             "time_unit='seconds')."
         )
-    return times, "s", fps
+    return times, fps

@@ -52,8 +52,7 @@ def test_exact_times_count_more_than_another_stated_rate(share, n_frames):
     with pytest.warns(UserWarning, match=message):
         facts = describe_times("a.trc", times, stated=50 * share)
     assert facts == {"frame_rate": 50, "first_time": 0}
-    # In frames they say nothing of seconds, and the caller's rate replaces all others.
-    assert described(times, stated=50 * share, unit="frames") == {"frame_rate": None}
+    # The caller's rate replaces all others.
     given = described(times, stated=50 * share, frame_rate=7)["frame_rate"]
     assert (given, type(given)) == (7.0, float)
 
@@ -88,9 +87,6 @@ def test_a_lost_frame_makes_times_uneven(lost, stated):
     assert facts == {"frame_rate": None, "first_time": 0.0, "times": times.tolist()}
     facts = describe_times("a.trc", times, stated=stated, decimals=3, frame_rate=50)
     assert facts == {"frame_rate": 50.0, "first_time": 0.0, "times": times.tolist()}
-    with pytest.warns(UserWarning, match=r"in steps of 1 to 2 frames, but"):
-        facts = describe_times("a.trc", times / STEP, unit="frames")
-    assert facts == {"frame_rate": None, "times": (times / STEP).tolist()}
 
 
 @pytest.mark.parametrize(("decimals", "most"), [(17, 0.1), (2, 0.35), (1, 0.45)])
