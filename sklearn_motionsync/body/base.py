@@ -19,7 +19,6 @@ from ..inputs.validation import (
     names_of_input,
     restore,
 )
-from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .axes import check_upright, fill_heading, heading_axes, to_y_up
@@ -195,7 +194,7 @@ class Body:
             )
 
 
-class PositionsTransformer(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstimator):
+class PositionsTransformer(LongWorkMixin, TrialTransformerMixin, BaseEstimator):
     """Base of the transformers that compute features of joint positions, body by body.
 
     A subclass has a ``skeleton``; ``hidden``, which is "raise" or "nan"; ``_names``, of its

@@ -19,16 +19,9 @@ SMALLEST, LARGEST = 1e-9, 1e9
 _TIMES = np.datetime64, np.timedelta64, date, time, timedelta, pd.Period
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
 _TEXT = (
-    "Give numbers: pd.read_csv(path, decimal=',') reads decimal commas, "
-    "to_trials(df, by=..., time=...) takes columns that name the trial or the time, and "
-    "pd.to_numeric(column, errors='coerce') makes other text NaN"
-)
-_UNITS = (
-    "The first row looks like a row of units: leave it out, as by pd.read_csv(path, skiprows=[1])"
-)
-_LABEL = (
-    "It looks like a label, such as the trial's name: name it in by=, or drop it. "
-    "to_trials(df, by=..., time=...) takes it"
+    "Give numbers: pd.read_csv(path, decimal=',') reads decimal commas, skiprows=[1] leaves out a "
+    "row of units, to_trials(df, by=..., time=...) takes columns that name the trial or the time, "
+    "and pd.to_numeric(column, errors='coerce') makes other text NaN"
 )
 _ADVICE = "Interpolate the gap, as by sklearn_motionsync.io.fill_gaps(x, max_gap=10)"
 # The name of a file, by its ending, which begins with a letter.
@@ -114,10 +107,6 @@ def refuse_non_numeric(values, what):
             # A column takes a copy of all attrs, so only those in question are taken.
             if dtype.kind not in "biufc":
                 _refuse_column(values.iloc[:, k], f"{what}, column {name!r},")
-    elif isinstance(values, np.ndarray) and values.ndim == 2 and values.dtype.kind in "OSU":
-        # As from a table.
-        for column in values.T:
-            _refuse_column(pd.Series(column), what)
     else:
         _refuse_items(values, what)
 
@@ -134,39 +123,13 @@ def _is_masked(values):
 def _refuse_column(column, what):
     # Periods are objects, too.
     if column.dtype.kind in "OSUTMm":
-        _refuse_items(column.to_numpy(dtype=object), what, column)
+        _refuse_items(column.to_numpy(dtype=object), what)
 
 
-def _advice_on_text(text, column):
-    """What to do about a text, and the column of a table that it is in or None."""
-    advice = _TEXT
-    if isinstance(text, os.PathLike) or _FILE.fullmatch(str(text)):
-        reader = "pd.read_csv" if str(text).endswith((".csv", ".txt")) else "read_motion"
-        advice = f"Give what is in it: {reader}(path) reads files"
-    if column is None or len(column) < 2:
-        return advice
-    texts = column[column.notna()].astype(str)
-    numbers = pd.to_numeric(column, errors="coerce")
-    rows = np.flatnonzero(column.notna() & numbers.isna())
-    if len(rows) and rows[0] == 0 and numbers.notna().any():
-        # One a file in a table of several: the same text, and no two of them on end.
-        same = column.iloc[rows].nunique() == 1 and (np.diff(rows) > 1).all()
-        return _UNITS if same else advice
-    commas = pd.to_numeric(texts.str.replace(",", "."), errors="coerce")
-    if commas.isna().all() and texts.nunique() <= len(texts) / 2:
-        return _LABEL
-    return advice
-
-
-def _refuse_items(values, what, column=None):
-    """Refuse text, dates and fields in arrays, and in lists of lists."""
+def _refuse_items(values, what):
+    """Refuse text and dates in arrays, and in lists of lists."""
     if isinstance(values, np.ndarray):
         kind = values.dtype.kind
-        if kind == "V":
-            raise ValueError(
-                f"{what} is a structured array with {len(values.dtype.names or ())} fields: give "
-                "numpy.lib.recfunctions.structured_to_unstructured(x)."
-            )
         if kind not in "OSUMm":
             return
         values = values.ravel().tolist() if kind in "SU" else values.ravel()
@@ -174,7 +137,10 @@ def _refuse_items(values, what, column=None):
         values = [values]
     for value in values:
         if isinstance(value, (str, bytes, os.PathLike)):
-            advice = _advice_on_text(value, column)
+            advice = _TEXT
+            if isinstance(value, os.PathLike) or _FILE.fullmatch(str(value)):
+                reader = "pd.read_csv" if str(value).endswith((".csv", ".txt")) else "read_motion"
+                advice = f"Give what is in it: {reader}(path) reads files"
             raise ValueError(_not_numeric(value, what, f"{str(value)[:60]!r}. {advice}"))
         if isinstance(value, _TIMES):
             kind = type(value).__name__

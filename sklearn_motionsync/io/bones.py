@@ -119,16 +119,14 @@ def _read_declaration(text, key, joints, stack):
 def _read_channels(text, is_end):
     number = text.word("the number of CHANNELS")
     # There are six different channels, so no longer list can be right.
-    if not number.isdigit() or len(number) > 1 or int(number) > len(_CHANNELS):
-        raise text.error(f"CHANNELS needs a number from 0 to 6, got {quote([number])}.")
-    channels = [text.word("the name of a channel").upper() for _ in range(int(number))]
-    if not set(channels) <= set(_CHANNELS) or len(set(channels)) < len(channels):
+    n = int(number) if number.isdigit() and len(number) == 1 else -1
+    channels = [text.word("the name of a channel").upper() for _ in range(n)]
+    unique = set(channels)
+    if len(unique) != n or not unique <= set(_CHANNELS) or (is_end and channels):
         raise text.error(
-            f"CHANNELS {int(number)} needs as many different names of Xposition ... Zrotation, "
-            f"got {quote(channels)}."
+            "CHANNELS needs a number from 0 to 6 and as many different names of Xposition ... "
+            f"Zrotation, of an End Site none; got {quote([number, *channels])}."
         )
-    if is_end and channels:
-        raise text.error("an End Site has no CHANNELS.")
     return channels
 
 

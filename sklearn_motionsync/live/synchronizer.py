@@ -25,7 +25,6 @@ from ..matching.warps import normalise
 from ..matching.warps import sample as sample_at
 from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
-from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import FRAME_RATE, validated_with_nested
 from .causal import CausalTrellis, causal_velocity
@@ -43,9 +42,7 @@ from .stream import (
 )
 
 
-class OnlineSynchronizer(
-    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator
-):
+class OnlineSynchronizer(LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator):
     """The phase of a trial while it runs, frame by frame, however long it will last.
 
     The frames so far are the base of the trellis, and the mean of the synchronised training

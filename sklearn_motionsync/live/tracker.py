@@ -21,7 +21,6 @@ from ..inputs.types import Indexed, Labels, NumbersLike, RandomState, TrialsLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import check_match
-from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
 from ..utils.parallel import LongWorkMixin, one_blas_thread
 from ..utils.parameters import FRAME_RATE, validated
@@ -30,7 +29,7 @@ from .state_space import Clock, TrackerModel
 from .stream import check_observations, check_times, times_of_each
 
 
-class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
+class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """Track a body that is partly hidden, by the mean of its action and the variation of people.
 
     Given the phase p of the action, a pose is ``mean(p) + deviation``, and an observation

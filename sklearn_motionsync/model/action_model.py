@@ -22,7 +22,6 @@ from ..inputs.wording import counted
 from ..matching.gaps import fill_with_mean, is_gappy
 from ..synchronizers.learning import SynchronizationWarning
 from ..synchronizers.match import STANDARD, Match
-from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups, group_counts, refuse_classes_as_people
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
@@ -47,7 +46,7 @@ _VARIANCE_FLOOR = 1e-9
 _MANY_OF_TWO = 20
 
 
-class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
+class ActionModel(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """The mean movement, how much people vary about it, and whether a trial is that movement.
 
     It learns from aligned trials. Those that are unlike them are refused:

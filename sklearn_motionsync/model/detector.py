@@ -19,7 +19,6 @@ from ..body.mirror import exchange_of_sides
 from ..inputs.types import Labels, TrialsLike
 from ..matching.counting import first_largest
 from ..matching.gaps import fill_with_mean, is_gappy
-from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups, group_counts
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
@@ -52,7 +51,7 @@ _TWO_SIDED = "duration", "energy"
 _ALONE = 1.5
 
 
-class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEstimator):
+class ActionDetector(LongWorkMixin, MetaEstimatorMixin, BaseEstimator):
     """Whether trials are the movement, by its shape, timing and size.
 
     It learns from trials of one movement, by a pipeline with a synchronizer and an `ActionModel`.

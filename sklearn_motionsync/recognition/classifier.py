@@ -21,7 +21,6 @@ from ..inputs.validation import SequenceLevelMixin
 from ..matching.counting import first_largest
 from ..model.action_model import ActionModel
 from ..synchronizers.dense import DenseSynchronizer
-from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import (
     encode_classes,
     encode_groups,
@@ -37,9 +36,7 @@ _COVERAGE = 0.95
 _GOLDEN = (5**0.5 - 1) / 2
 
 
-class ActionClassifier(
-    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, ClassifierMixin, BaseEstimator
-):
+class ActionClassifier(LongWorkMixin, SequenceLevelMixin, ClassifierMixin, BaseEstimator):
     """Which of several movements trials are, and whether they are any of them.
 
     It learns bends and half bends, and is given one of each, and standing still, of a new person:

@@ -46,7 +46,6 @@ from ..matching.gaps import is_gappy
 from ..matching.matcher import Features
 from ..matching.median import Median, linear_median
 from ..matching.warps import normalise
-from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from ..utils.pipelines import Routed, remember_match
@@ -66,9 +65,7 @@ from .training import (
 )
 
 
-class Synchronizer(
-    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, BaseEstimator
-):
+class Synchronizer(LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, BaseEstimator):
     """Base class of all synchronizers: a subclass defines ``match``.
 
     It inherits ``fit``, which chooses the pattern after linear normalisation,

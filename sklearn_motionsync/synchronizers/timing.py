@@ -19,7 +19,6 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.types import NamesLike, Transformed, TrialsLike, Unit
 from ..inputs.validation import restore
-from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import FRAME_RATE, validated_with_nested
 from .base import Synchronizer
@@ -34,9 +33,7 @@ _OFFSET, _ERROR = "offset", "offset_error"
 _TELLING = (DenseSynchronizer, PartSynchronizer)
 
 
-class TimingChannel(
-    DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator
-):
+class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator):
     """Synchronised trials, with their timing as an additional feature.
 
     Synchronisation removes differences in timing from the curves. Here they are appended to the

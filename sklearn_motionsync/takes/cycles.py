@@ -27,7 +27,6 @@ from ..inputs.resampling import as_frame_rates
 from ..inputs.types import TrialsLike, ValuesLike
 from ..inputs.validation import check_input, names_of_input
 from ..matching.counting import ROUNDING, first_largest, whole
-from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import FRAME_RATE, validated
 from .cutting import as_takes, cut_takes
@@ -69,7 +68,7 @@ _COLUMNS = {
 STRIKES = {f"{side} strike": side for side in SIDES}
 
 
-class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
+class CycleSegmenter(LongWorkMixin, BaseEstimator):
     """Cut long takes of walking, running, or any movement that repeats, into its cycles.
 
     A take is one recording of several repetitions. A cycle is one repetition: it becomes one trial

@@ -24,18 +24,11 @@ from ..inputs.validation import (
 from ..inputs.wording import counted
 from ..matching.counting import ROUNDING
 from ..matching.gaps import Filler, is_gappy, moments_of_seen
-from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 
 
-class ASpace(
-    DocumentedMixin,
-    LongWorkMixin,
-    ClassNamePrefixFeaturesOutMixin,
-    TrialTransformerMixin,
-    BaseEstimator,
-):
+class ASpace(LongWorkMixin, ClassNamePrefixFeaturesOutMixin, TrialTransformerMixin, BaseEstimator):
     """Principal components of all poses of a movement: few numbers instead of many.
 
     The second of these signals is twice the first, and the third is constant. One number a frame

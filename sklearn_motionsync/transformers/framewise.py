@@ -21,7 +21,6 @@ from ..inputs.validation import (
     check_transformed,
     restore,
 )
-from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from ..utils.pipelines import takes_gaps
@@ -32,7 +31,7 @@ def _goes_back(self):
     return self.__dict__.get("_inverts", hasattr(self.transformer, "inverse_transform"))
 
 
-class FrameWise(DocumentedMixin, LongWorkMixin, TrialTransformerMixin, BaseEstimator):
+class FrameWise(LongWorkMixin, TrialTransformerMixin, BaseEstimator):
     """Apply a transformer of rows, such as ``StandardScaler``, to the frames of trials.
 
     The transformer is fitted on the pooled frames of all trials. A scaler therefore scales a

@@ -16,6 +16,8 @@ from joblib.parallel import get_active_backend
 from sklearn import config_context, get_config
 from threadpoolctl import ThreadpoolController
 
+from .doc_links import DocumentedMixin
+
 try:
     from sklearn.callback import CallbackSupportMixin
 except ImportError:  # scikit-learn before 1.9 has no callbacks
@@ -135,7 +137,7 @@ def _allow_any_thread():
 # -- progress ----------------------------------------------------------------------------
 
 
-class LongWorkMixin(CallbackSupportMixin):
+class LongWorkMixin(DocumentedMixin, CallbackSupportMixin):
     """Progress of estimators: callbacks, and lines of text where there is a ``verbose``."""
 
     def _progress(self, *, fits):
