@@ -31,7 +31,7 @@ class MotionKernel:
     """A weighted mean of kernels ``exp(-D / median(D))``, medians over the training pairs.
 
     There are four views of trials. Distances by costs of velocities make the first, and by the cost
-    of poses the second. The third is of `summary_statistics`, the last of `change_extremes` and
+    of poses the second. The third is of `summary_statistics`, the last of extremes of changes and
     `change_shares`: squared Euclidean distances, in standard deviations of the training set. A
     view is the mean of its kernels.
 
@@ -146,7 +146,7 @@ class MotionKernel:
         units = self._change_units
         return [
             np.array([summary_statistics(x) for x in scaled]),
-            np.array([change_extremes(c) for c in changes]),
+            np.array([np.concatenate([c.min(axis=1), c.max(axis=1)], axis=None) for c in changes]),
             np.array([change_shares(c, units) for c in changes]),
         ]
 
@@ -207,11 +207,6 @@ def changes_of(x):
     return np.stack(
         [x[np.minimum(frames + r, frames[-1])] - x[np.maximum(frames - r, 0)] for r in reaches]
     )
-
-
-def change_extremes(changes):
-    """Minima and maxima of changes (n_reaches, P, n_features), of every feature and reach."""
-    return np.concatenate([changes.min(axis=1), changes.max(axis=1)], axis=None)
 
 
 def change_shares(changes, units):
