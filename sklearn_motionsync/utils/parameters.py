@@ -1,7 +1,6 @@
-"""scikit-learn's checks of parameters as decorators, and what old names of the package say."""
+"""scikit-learn's checks of parameters as decorators."""
 
 from collections.abc import Callable
-from inspect import currentframe
 from numbers import Real
 from typing import Any, TypeVar, cast
 
@@ -45,14 +44,3 @@ def validated_function(constraints: dict[str, list]) -> Callable[[_Function], _F
         As in ``_parameter_constraints`` of an estimator.
     """
     return validate_params(constraints, prefer_skip_nested_validation=True)
-
-
-def error_of_old_name(old, new):
-    """The error of a module's ``__getattr__`` for a name that has moved.
-
-    ``hasattr`` needs an AttributeError; an import would not show its message, and gets an
-    ImportError.
-    """
-    asked_by = currentframe().f_back.f_back.f_code.co_name
-    error = ImportError if asked_by == "_handle_fromlist" else AttributeError
-    return error(f"{old} is {new} now.")

@@ -90,11 +90,10 @@ def test_page_has_no_private_words(name):
 
 # -- the code ---------------------------------------------------------------------------
 
-# What is called so elsewhere: a journal, names of Python, scikit-learn, CSS and browsers, and the
-# old names of the package, which are refused with the new ones.
+# What is called so elsewhere: a journal, names of Python, scikit-learn, CSS and browsers.
 ELSEWHERE = (
     r"Gait & Posture|Posture\* 30|string import Template|Template\(|_doc_link_template"
-    r"|others call it a template|grid-?[tT]emplate-?[cC]olumns|(blend|find|load)_performances"
+    r"|others call it a template|grid-?[tT]emplate-?[cC]olumns"
     r"|performance\.now\(\)"
 )
 
