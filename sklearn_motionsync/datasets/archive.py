@@ -109,12 +109,10 @@ def load_trials(path: Path) -> Bunch:
     columns = [f"{joint}_{axis}" for joint in joints for axis in "xyz"]
     for i, x in enumerate(data):
         check_finite(x, f"{path}: trial {i}, frame", columns)
-        frame, column = np.unravel_index(np.abs(x).argmax(), x.shape)
-        if abs(x[frame, column]) > FARTHEST:
+        if np.abs(x).max() > FARTHEST:
             raise ValueError(
-                f"{path}: trial {i}, frame {frame}: {columns[column]!r} is {x[frame, column]:.3g}. "
-                f"No recording has positions beyond {FARTHEST:g}: the archive is damaged, or in "
-                "another unit."
+                f"{path}: trial {i} has positions beyond {FARTHEST:g}, as no recording has: the "
+                "archive is damaged, or in another unit."
             )
     return Bunch(
         data=data,
@@ -138,8 +136,8 @@ def _check_fields(path, fields):
         x, expected = fields[name], tuple(sizes[size] for size in shape.split(", "))
         if x.dtype.kind not in kinds or x.shape != expected or not x.size:
             raise ValueError(
-                f"{path}: {name} must be {words} of the shape ({shape}), with {n_trials} trials, "
-                f"{n_frames} frames and {n_joints} joints, got {x.dtype} {x.shape}."
+                f"{path}: {name} must be {words} of the shape ({shape}), where N is {n_trials}, F "
+                f"{n_frames} and joints {n_joints}, got {x.dtype} {x.shape}."
             )
     # Differences of unsigned numbers are never negative.
     offsets = fields["offsets"].astype(np.int64)

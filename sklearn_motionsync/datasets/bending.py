@@ -117,8 +117,6 @@ def make_bending(
             These moments on the scale of ``times``.
         skeleton : Skeleton
             The paper's skeleton of fifteen joints.
-        joints : list of str
-            Names of the joints.
         target, actor, take : ndarray of str (n_trials,)
             The action, the actor, and the number of the trial.
         frame_rate : float
@@ -162,7 +160,6 @@ def make_bending(
         keyframe_names=list(_KEYFRAMES),
         keyframe_times=moments,
         skeleton=Skeleton.paper(),
-        joints=list(Skeleton.paper().joints),
         target=np.full(n_trials, "bending"),
         actor=np.array([f"actor{k}" for k in numbers % n_actors]),
         take=np.array([f"{k:03d}" for k in numbers // n_actors + 1]),

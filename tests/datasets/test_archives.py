@@ -53,10 +53,11 @@ def test_archive_becomes_a_bunch(tmp_path, number):
         ({"offsets": np.array([0, 2**64 - 2, 12], "u8")}, "offsets must increase"),
         (
             {"label": ["bow"]},
-            r"label must be text of the shape \(N\), with 2 trials, .*, got <U3 \(1,\)",
+            r"label must be text of the shape \(N\), where N is 2, .*, got <U3 \(1,\)",
         ),
         ({"label": np.array([{}, {}], dtype=object)}, "cannot be read as a NumPy .npz archive"),
         (replaced("positions", (7, 0, 1), np.nan), r"trial 1, frame 2, .*HipCenter_y'\) is N"),
+        (replaced("positions", (7, 0, 1), 2e7), r"trial 1 has positions beyond 1e\+07"),
         *(
             (replaced("parents", 1, parent, float), "parents must be indices of joints, whole num")
             for parent in (0.5, np.nan, 20, -2, 2**40)

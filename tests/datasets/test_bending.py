@@ -6,7 +6,7 @@ from sklearn_motionsync.datasets import make_bending
 
 
 def joint(bunch, i, name):
-    j = bunch.joints.index(name)
+    j = bunch.skeleton.joints.index(name)
     return bunch.data[i][:, 3 * j : 3 * j + 3]
 
 
@@ -41,7 +41,7 @@ def test_limbs_keep_their_length():
     bunch = make_bending(3, noise=0, random_state=0)
     for i in range(3):
         for a, b in bunch.skeleton.bones:
-            ends = (joint(bunch, i, bunch.joints[k]) for k in (a, b))
+            ends = (joint(bunch, i, bunch.skeleton.joints[k]) for k in (a, b))
             length = np.linalg.norm(np.subtract(*ends), axis=1)
             np.testing.assert_allclose(length, length[0])
 
