@@ -150,12 +150,9 @@ class Skeleton:
             raise ValueError(
                 f"n_dims must be 3, or 2 for positions in the plane, got {self.n_dims!r}."
             )
-        ups = UP_AXES[self.n_dims]
-        if not (isinstance(self.up, str) and self.up in ups):
-            raise ValueError(
-                f"up must be {', '.join(map(repr, list(ups)[:-1]))} or {list(ups)[-1]!r}, got "
-                f"{self.up!r}."
-            )
+        ups = list(UP_AXES[self.n_dims])
+        if not isinstance(self.up, str) or self.up not in ups:
+            raise ValueError(f"up must be among {ups}, got {self.up!r}.")
         named = {} if self.landmarks is None else _as_landmarks(self.landmarks)
         landmarks = named
         if self.landmarks is None:
