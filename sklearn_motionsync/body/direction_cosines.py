@@ -12,12 +12,13 @@ from ..inputs.types import Transformed, TrialsLike
 from ..inputs.validation import check_transformed, restore
 from .axes import convert_to_parent_axes, project_on_axes
 from .base import PositionsTransformer, mask_hidden
-from .formats import AXES, LANDMARKS, SIDES
+from .formats import LANDMARKS, SIDES
 from .limbs import (
     LATERAL_LIMBS,
     LIMB_NAMES,
     LIMBS,
     body_size,
+    cosine_names,
     limb_indices,
     lowest_height,
     unit_vectors,
@@ -235,9 +236,7 @@ class DirectionCosines(PositionsTransformer):
 
     @property
     def _names(self):
-        axes = AXES[self.skeleton.n_dims]
-        names = [f"{limb}_{axis}" for limb in self.skeleton.limbs for axis in axes]
-        return ["pelvis_height"] * self.skeleton.has_height + names
+        return cosine_names(self.skeleton.limbs, self.skeleton.n_dims, self.skeleton.has_height)
 
     def _features(self, portion, body):
         limbs, cosines = self.skeleton.limbs, portion.directions
@@ -344,6 +343,3 @@ def _landmarks_of(heights, cosines, lengths, limbs):
 def _joined(at, skeleton):
     joints = skeleton.body().joints
     return np.concatenate([at[name] for name in LANDMARKS if name in joints], axis=1)
-
-
-# -- positions of joints -------------------------------------------------------------------

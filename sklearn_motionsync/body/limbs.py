@@ -142,41 +142,38 @@ def unit_vectors(vectors):
 # -- parts of the body --------------------------------------------------------------------
 
 
-def features_of_parts(limbs, n_dims, first):
-    """Indices of the features of each part, by its name.
-
-    The limbs are in the order of their cosines, of which each has ``n_dims``, and ``first`` is the
-    index of the first cosine.
-    """
-    limb_of = [None] * first + [limb for limb in limbs for _ in range(n_dims)]
-    return _by_part(limb_of)
+def cosine_names(limbs, n_dims, has_height):
+    """Names of the features of `DirectionCosines`: the height, and ``<limb>_<axis>``."""
+    names = [f"{limb}_{axis}" for limb in limbs for axis in AXES[n_dims]]
+    return ["pelvis_height"] * has_height + names
 
 
 def parts_of_names(names):
-    """Indices of the features of each part, of features of which some are ``<limb>_<axis>``.
-
-    Empty if only the trunk is found: joints may be called neck or hip, too.
-    """
+    """Indices of the features of each part that has some, of features called ``<limb>_<axis>``."""
     split = [str(name).rpartition("_") for name in names]
-    parts = _by_part([limb if axis in AXES[3] else None for limb, _, axis in split])
-    return {} if [*parts] == ["trunk"] else parts
+    limb_of = [limb if axis in AXES[3] else None for limb, _, axis in split]
+    parts = {
+        part: [k for k, limb in enumerate(limb_of) if limb in limbs]
+        for part, limbs in PARTS.items()
+    }
+    return {part: features for part, features in parts.items() if features}
 
 
-def parts_of_poses(trials):
-    """Indices of the features of each part, of poses without names; empty if they are others.
+def names_of_poses(trials):
+    """Names of the features of poses that came without; empty if they are others.
 
     Poses of the whole body are recognised by their 37 features: a height, and twelve times
     three cosines of length 1.
     """
-    n_limbs, n_dims = len(LIMB_NAMES), 3
-    if trials[0].shape[1] != 1 + n_limbs * n_dims:
-        return {}
+    names = cosine_names(LIMB_NAMES, 3, True)
+    if trials[0].shape[1] != len(names):
+        return []
     cosines = np.concatenate([x[:, 1:] for x in trials]).astype(np.float64)
     if not np.abs(cosines).max() < 1 + _UNIT_TOLERANCE:
-        return {}
-    squares = np.square(cosines.reshape(-1, n_limbs, n_dims)).sum(axis=2)
+        return []
+    squares = np.square(cosines.reshape(-1, len(LIMB_NAMES), 3)).sum(axis=2)
     are_directions = np.abs(squares - 1).mean(axis=0) < _UNIT_TOLERANCE
-    return features_of_parts(LIMB_NAMES, n_dims, 1) if are_directions.all() else {}
+    return names if are_directions.all() else []
 
 
 def names_of_cosines(trials, names):
@@ -191,12 +188,12 @@ def names_of_cosines(trials, names):
     -------
     list of str, or None
         ``names`` if some are those of limbs whose cosines have length 1; the names of
-        `DirectionCosines` for poses that `parts_of_poses` recognises; otherwise None.
+        `DirectionCosines` for poses that `names_of_poses` recognises; otherwise None.
     """
     parts = parts_of_names(names)
-    if not parts:
-        known = ["pelvis_height", *(f"{limb}_{axis}" for limb in LIMB_NAMES for axis in AXES[3])]
-        return known if parts_of_poses(trials) else None
+    # Joints may be called neck or hip, too, which are of the trunk.
+    if not set(parts) - {"trunk"}:
+        return names_of_poses(trials) or None
     cosines = [k for features in parts.values() for k in features]
     squares = np.concatenate([np.square(x[:, cosines]).sum(axis=1) for x in trials])
     n_limbs = len({names[k].rpartition("_")[0] for k in cosines})
@@ -206,12 +203,3 @@ def names_of_cosines(trials, names):
 def part_of_limb(limb):
     """The part of the body of a limb, such as ``"left arm"``; the pelvis is of the trunk."""
     return next((part for part, limbs in PARTS.items() if limb in limbs), "trunk")
-
-
-def _by_part(limb_of):
-    """Indices of the features whose limb is of a part; parts without features are left out."""
-    parts = {
-        name: [k for k, limb in enumerate(limb_of) if limb in limbs]
-        for name, limbs in PARTS.items()
-    }
-    return {name: features for name, features in parts.items() if features}

@@ -24,7 +24,14 @@ from .landmarks import (
     missing_counterparts,
     nearest_names,
 )
-from .limbs import LIMBS, complete_legs, features_of_parts, landmark_positions, limbs_between
+from .limbs import (
+    LIMBS,
+    complete_legs,
+    cosine_names,
+    landmark_positions,
+    limbs_between,
+    parts_of_names,
+)
 
 # A root that moves less than this share of the largest coordinate stands still, and the length of a
 # bone that changes less does not.
@@ -363,7 +370,7 @@ class Skeleton:
         >>> Skeleton.paper().parts()["left leg"]
         [13, 14, 15, 19, 20, 21]
         """
-        return features_of_parts(self.limbs, self.n_dims, int(self.has_height))
+        return parts_of_names(cosine_names(self.limbs, self.n_dims, self.has_height))
 
     @property
     def limbs(self) -> list[str]:

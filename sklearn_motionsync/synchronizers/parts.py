@@ -14,7 +14,7 @@ from scipy.stats import t as student
 from sklearn.base import clone
 from sklearn.utils._param_validation import Interval
 
-from ..body.limbs import parts_of_names, parts_of_poses
+from ..body.limbs import names_of_poses, parts_of_names
 from ..inputs.features import choose_features
 from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import (
@@ -412,8 +412,9 @@ def choose_parts(parts, trials, names):
         Of their features.
     """
     if parts is None:
-        recognised = parts_of_poses(trials) if names is None else parts_of_names(names)
-        return {name: np.array(features) for name, features in recognised.items()}
+        known = parts_of_names(names_of_poses(trials) if names is None else names)
+        # Joints may be called neck or hip, too, which are of the trunk.
+        return {} if [*known] == ["trunk"] else {part: np.array(k) for part, k in known.items()}
     names = [f"x{i}" for i in range(trials[0].shape[1])] if names is None else [*names]
     chosen, owner = {}, {}
     for part, features in parts.items():
