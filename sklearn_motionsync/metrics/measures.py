@@ -63,23 +63,12 @@ def group_timing_error(
         )
     last, shown = times.shape[1] - 1, np.empty(times.shape)
     for i, (tau, phi) in enumerate(zip(times, rows, strict=True)):
-        if phi.ndim != 1 or len(phi) < 2:
+        is_one_a_frame = phi.ndim == 1 and len(phi) >= 2
+        if not (is_one_a_frame and _is_inside(phi, 1).all() and np.diff(phi).min() >= -_ROUNDING):
             raise ValueError(
-                f"Trial {i}: moments must have shape (n_frames,), one a frame of the "
-                f"trial and at least 2, got {phi.shape}."
-            )
-        inside = _is_inside(phi, 1)
-        if not inside.all():
-            p = int(np.argmin(inside))
-            raise ValueError(
-                f"Trial {i}: moments are shares of the action, from 0 to 1, got {phi[p]:.10g}"
-                f" at frame {p}. For seconds give (t - t[0]) / (t[-1] - t[0])."
-            )
-        decreases = np.diff(phi) < -_ROUNDING
-        if decreases.any():
-            raise ValueError(
-                f"Trial {i}: moments must not decrease; they do after frame "
-                f"{int(np.argmax(decreases))}."
+                f"Trial {i}: moments must be shares of the action, one a frame of the trial and at "
+                f"least 2, from 0 to 1, and must not decrease; got {phi.tolist()!r:.200}. For "
+                "seconds give (t - t[0]) / (t[-1] - t[0])."
             )
         moments_of_frames = np.clip(phi, 0, 1)
         shown[i] = np.interp(tau * (len(phi) - 1) / last, np.arange(len(phi)), moments_of_frames)
@@ -127,29 +116,21 @@ def keyframe_error(
     times = _as_warps(times)
     n_sequences, P = times.shape
     lengths = as_numbers(n_frames, "n_frames", dtype=np.float64)
-    if lengths.shape != (n_sequences,):
+    valid = (lengths >= 2) & (lengths == np.floor(lengths)) & np.isfinite(lengths)
+    if lengths.shape != (n_sequences,) or not valid.all():
         raise ValueError(
             f"n_frames must be the lengths of the {counted(n_sequences, 'trial')}, such as "
-            f"[len(x) for x in X], got shape {lengths.shape}."
-        )
-    valid = (lengths >= 2) & (lengths == np.floor(lengths)) & np.isfinite(lengths)
-    if not valid.all():
-        i = int(np.argmin(valid))
-        raise ValueError(
-            f"Trial {i}: n_frames must be a whole number of at least 2, got {lengths[i]:.10g}."
+            f"[len(x) for x in X], whole numbers of at least 2; got {lengths.tolist()!r:.200}, "
+            f"wrong for the trials {np.flatnonzero(~valid).tolist()}."
         )
     pattern = as_numbers(pattern_keyframes, "pattern_keyframes", dtype=np.float64)
-    if pattern.ndim != 1 or len(pattern) < 1:
-        raise ValueError(
-            "pattern_keyframes must have shape (n_keyframes,), with at least one, got "
-            f"{pattern.shape}."
-        )
     rows = _as_rows(keyframes, "keyframes")
-    if [row.shape for row in rows] != [pattern.shape] * n_sequences:
+    shapes = [row.shape for row in rows]
+    if pattern.ndim != 1 or len(pattern) < 1 or shapes != [pattern.shape] * n_sequences:
         raise ValueError(
-            f"keyframes must have {counted(len(pattern), 'number')}, as pattern_keyframes, for "
-            f"each of the {counted(n_sequences, 'warp')}; got the shapes "
-            f"{[row.shape for row in rows]}."
+            "pattern_keyframes must have shape (n_keyframes,), with at least one, and keyframes "
+            f"as many numbers for each of the {counted(n_sequences, 'warp')}; got the shapes "
+            f"{pattern.shape} and {shapes}."
         )
     pattern = _in_order(pattern, P - 1, "The pattern", "frames of the clock")
     frames = []

@@ -159,16 +159,11 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         """The mean score of the folds, each by clones that are fitted without it."""
         synchronizer, trials = reached.synchronizer, reached.trials
         n_features = trials[0].shape[1]
-        if n_features < 2:
-            raise ValueError(
-                "FeatureHoldoutScorer holds features out, and these trials have only one, as "
-                "have all rows of a 2-D array: use SpreadScorer. "
-                f"(n_folds={self.n_folds!r} must be from 2 to the number of features.)"
-            )
         if not isinstance(self.n_folds, Integral) or not 2 <= self.n_folds <= n_features:
             raise ValueError(
-                f"n_folds={self.n_folds!r} must be between 2 and the {n_features} features there "
-                "are, a whole number."
+                f"n_folds={self.n_folds!r} must be a whole number from 2 to the number of features "
+                f"of these trials, {n_features}, some of which are held out. Of a single feature, "
+                "as of the rows of a 2-D array, use SpreadScorer."
             )
         if len(inspect.signature(synchronizer.match).parameters) > 1:
             # Metadata that the estimator needs are missing for its clones, too.
