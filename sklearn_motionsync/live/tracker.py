@@ -92,11 +92,6 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         Standard deviation of the log rate.
     rate_memory_ : float
         Frames of the training trials after which its correlation is 1/e.
-    surprise_limit_ : float
-        Limit of the NIS of velocities, averaged over 9 % of the mean duration; 1 is expected. It is
-        four times as far from 1 as the largest of the training trials.
-    departure_limit_ : float
-        Limit of the NIS of poses about the mean: at least 9, three standard deviations.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -232,7 +227,6 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         self.covariance_ = model.process.covariance
         self.length_scale_ = float(np.sqrt(3) / model.process.decay)
         self.rate_spread_, self.rate_memory_ = model.rates
-        self.surprise_limit_, self.departure_limit_ = map(float, model.nis_limits)
         self._model, self._seed, self._running = model, seed, None
         return self
 

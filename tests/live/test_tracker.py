@@ -221,7 +221,6 @@ def test_poses_far_from_the_mean_are_lost(tracker, deviation, lost):
     noise = np.sqrt(np.diag(tracker.covariance_) + tracker.noise**2)
     track = tracker.track(movement(1.05) + deviation * noise * [1, -1, 1])
     assert track.lost[20:].any() == lost
-    assert tracker.departure_limit_ == 9
 
 
 @pytest.mark.parametrize("pause", [0, 30])
