@@ -268,9 +268,8 @@ class PartSynchronizer(AnchoredSynchronizer):
                 "There are no parts: they are not given, and the features are not recognised as "
                 "direction cosines. Fit again with parts={name: features}, or skeleton.parts()."
             )
-        people = None
         if groups is not None:
-            groups, people = encode_groups(groups, len(trials))
+            groups, _ = encode_groups(groups, len(trials))
         # Free of coupling, no part is drawn to the body, and its warp is not needed.
         even = np.tile(np.arange(self.n_frames_, dtype=np.float64), (len(trials), 1))
         matches = self._match_parts(trials, Match(even), self._warpers, free=True)
@@ -288,7 +287,7 @@ class PartSynchronizer(AnchoredSynchronizer):
             for name in self.parts_
         ]
         values = np.stack(lags, axis=1)
-        return Lags(values, [*self.parts_], unit, groups, people)
+        return Lags(values, [*self.parts_], unit, groups)
 
     def _warped(self, trials, match):
         out = match.warp(trials)
@@ -463,8 +462,6 @@ class Lags(NamedTuple):
         Unit of the values.
     groups : ndarray of int, shape (n_sequences,), default=None
         The subject of every trial, counted from 0.
-    people : list, default=None
-        Labels of the subjects.
 
     Examples
     --------
@@ -474,7 +471,7 @@ class Lags(NamedTuple):
     >>> from sklearn_motionsync.synchronizers import Lags
     >>> values = np.repeat([0.0, 0.2, 4.0, 4.4], 5).reshape(4, 1, 5)
     >>> groups = np.array([0, 0, 1, 1])
-    >>> lags = Lags(values, ["arm"], "frames", groups, ["ann", "bob"])
+    >>> lags = Lags(values, ["arm"], "frames", groups)
     >>> lags.summary()[["mean", "sd_within", "sd_between", "icc"]].round(2)
           mean  sd_within  sd_between   icc
     part
@@ -490,7 +487,6 @@ class Lags(NamedTuple):
     parts: list[str]
     unit: Unit
     groups: np.ndarray | None = None
-    people: list | None = None
 
     def summary(self) -> pd.DataFrame:
         """The mean lag of a trial over the clock, and its spread, part by part.

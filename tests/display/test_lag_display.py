@@ -13,7 +13,7 @@ from sklearn_motionsync.synchronizers import Lags
 # Twelve trials of four people; the arm is late in the second half, the leg never.
 VALUES = np.random.default_rng(0).normal(0, 0.3, (12, 2, 21))
 VALUES[:, 0, 11:] += 5
-LAGS = Lags(VALUES, ["arm", "leg"], "frames", np.repeat(range(4), 3), list("abcd"))
+LAGS = Lags(VALUES, ["arm", "leg"], "frames", np.repeat(range(4), 3))
 
 
 def test_curves_show_mean_interval_and_standard_deviation():

@@ -285,7 +285,7 @@ def test_spread_within_and_between_subjects_agrees_with_scipy():
     own = {"a": 1.0, "b": -2.0, "c": 0.5}
     values = np.array([own[g] for g in groups])[:, np.newaxis] + rng.normal(size=(9, 6))
     codes = np.unique(groups, return_inverse=True)[1]
-    lags = Lags(values.reshape(9, 2, 3), ["arm", "leg"], "frames", codes, list("abc"))
+    lags = Lags(values.reshape(9, 2, 3), ["arm", "leg"], "frames", codes)
     table = lags.over_time()
     assert table.index[4] == ("leg", 1)
     for column, row in zip(values.T, table.itertuples(), strict=True):
