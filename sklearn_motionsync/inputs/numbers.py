@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
+from ..matching.counting import ROUNDING
+
 # The precisions that are kept.
 FLOATS = np.dtype(np.float64), np.dtype(np.float32)
 # Limits of the largest magnitude of a set of trials. In any unit of motion capture data lie
@@ -201,6 +203,26 @@ def check_magnitude(largest, what, *, training):
             f"{what} holds the largest magnitude of all, {largest:.3g}. It must be between "
             f"{SMALLEST:g} and {LARGEST:g} unless all values are 0: give the data in another unit."
         )
+
+
+def as_warps(times) -> np.ndarray:
+    """Warps (n_sequences, P), from 0 to P - 1 but for rounding, which is taken off: a new array."""
+    times = as_numbers(times, "times", dtype=np.float64)
+    if times.ndim != 2 or times.shape[1] < 2:
+        raise ValueError(
+            "times must have shape (n_sequences, P), one row a trial and P at least 2, "
+            f"got {times.shape}."
+        )
+    last = times.shape[1] - 1
+    # Not a number fails the comparison, too.
+    inside = (times >= -ROUNDING) & (times <= last + ROUNDING)
+    if not inside.all():
+        i, p = np.argwhere(~inside)[0]
+        raise ValueError(
+            f"Trial {i}: times must be from 0 to P - 1 = {last}, in frames of the clock, "
+            f"got {times[i, p]:.10g} at frame {p}."
+        )
+    return np.clip(times, 0, last)
 
 
 def column_names(x):

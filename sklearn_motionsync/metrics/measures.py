@@ -9,14 +9,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from ..inputs.numbers import as_numbers
+from ..inputs.numbers import as_numbers, as_warps
 from ..inputs.recorded import refuse_seconds
 from ..inputs.types import Indexed, NumbersLike, ValuesLike
 from ..inputs.wording import counted
+from ..matching.counting import ROUNDING
 from ..matching.warps import evaluate_warps
-
-# Rounding of warps, in frames: bounds may be exceeded by as much.
-_ROUNDING = 1e-9
 
 
 def group_timing_error(
@@ -55,16 +53,16 @@ def group_timing_error(
     >>> group_timing_error([[0, 1, 2], [0, 1, 2]], [[0, 0.5, 1], [0, 0.7, 1]])
     0.0666...
     """
-    times = _as_warps(times)
+    times = as_warps(times)
     rows = _as_rows(moments, "moments")
-    if len(rows) != len(times):
+    if len(rows) != len(times) or not rows:
         raise ValueError(
             f"Got {counted(len(times), 'warp')} and {counted(len(rows), 'set')} of moments."
         )
     last, shown = times.shape[1] - 1, np.empty(times.shape)
     for i, (tau, phi) in enumerate(zip(times, rows, strict=True)):
         is_one_a_frame = phi.ndim == 1 and len(phi) >= 2
-        if not (is_one_a_frame and _is_inside(phi, 1).all() and np.diff(phi).min() >= -_ROUNDING):
+        if not (is_one_a_frame and _is_inside(phi, 1).all() and np.diff(phi).min() >= -ROUNDING):
             raise ValueError(
                 f"Trial {i}: moments must be shares of the action, one a frame of the trial and at "
                 f"least 2, from 0 to 1, and must not decrease; got {phi.tolist()!r:.200}. For "
@@ -113,11 +111,11 @@ def keyframe_error(
     >>> keyframe_error([[0, 1, 2, 3, 4]], [[5]], [2], [9])
     0.5
     """
-    times = _as_warps(times)
+    times = as_warps(times)
     n_sequences, P = times.shape
     lengths = as_numbers(n_frames, "n_frames", dtype=np.float64)
     valid = (lengths >= 2) & (lengths == np.floor(lengths)) & np.isfinite(lengths)
-    if lengths.shape != (n_sequences,) or not valid.all():
+    if lengths.shape != (n_sequences,) or not (n_sequences and valid.all()):
         raise ValueError(
             f"n_frames must be the lengths of the {counted(n_sequences, 'trial')}, such as "
             f"[len(x) for x in X], whole numbers of at least 2; got {lengths.tolist()!r:.200}, "
@@ -145,25 +143,6 @@ def keyframe_error(
 # -- checks of arguments ------------------------------------------------------------------
 
 
-def _as_warps(times) -> np.ndarray:
-    """Warps (n_sequences >= 1, P >= 2), from 0 to P - 1."""
-    times = as_numbers(times, "times", dtype=np.float64)
-    if times.ndim != 2 or times.shape[0] < 1 or times.shape[1] < 2:
-        raise ValueError(
-            "times must have shape (n_sequences, P), one row a trial and P at least 2, "
-            f"got {times.shape}."
-        )
-    last = times.shape[1] - 1
-    inside = _is_inside(times, last)
-    if not inside.all():
-        i, p = np.argwhere(~inside)[0]
-        raise ValueError(
-            f"Trial {i}: times must be from 0 to P - 1 = {last}, in frames of the clock, "
-            f"got {times[i, p]:.10g} at frame {p}."
-        )
-    return np.clip(times, 0, last)
-
-
 def _in_order(frames, last, whose, unit):
     """Key-frames of one trial, if they are inside it and increase."""
     if not (_is_inside(frames, last).all() and (np.diff(frames) > 0).all()):
@@ -187,4 +166,4 @@ def _as_rows(values, what):
 
 def _is_inside(array, last):
     # False for NaN.
-    return (array >= -_ROUNDING) & (array <= last + _ROUNDING)
+    return (array >= -ROUNDING) & (array <= last + ROUNDING)

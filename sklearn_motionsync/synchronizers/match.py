@@ -14,7 +14,7 @@ import pandas as pd
 from sklearn.base import BaseEstimator
 
 from ..inputs.long_tables import to_frame
-from ..inputs.numbers import as_numbers
+from ..inputs.numbers import as_numbers, as_warps
 from ..inputs.resampling import as_frame_rates
 from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import (
@@ -118,20 +118,8 @@ class Match:
         distances: ValuesLike | None = None,
         intervals: Intervals | None = None,
     ) -> None:
-        times = np.array(as_numbers(times, "times", dtype=np.float64))
-        if times.ndim != 2 or times.shape[1] < 2:
-            raise ValueError(
-                "times must have shape (n_sequences, P), one row a trial and at least 2 "
-                f"frames; got {times.shape}."
-            )
+        times = as_warps(times)
         n_sequences, n_frames = times.shape
-        # Not a number fails the comparison, too.
-        if not (times.min(initial=0) >= 0 and times.max(initial=0) <= n_frames - 1):
-            i = int(np.argmin(((times >= 0) & (times <= n_frames - 1)).all(axis=1)))
-            raise ValueError(
-                f"Trial {i}: times must be from 0 to P - 1 = {n_frames - 1}, in frames of "
-                f"the pattern, got {times[i].min():g} to {times[i].max():g}."
-            )
         back = np.diff(times) < -ROUNDING * n_frames
         if back.any():
             i, p = np.argwhere(back)[0]

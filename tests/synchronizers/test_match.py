@@ -132,7 +132,7 @@ def test_seconds_refuses_invalid_lengths_and_rates(matched, lengths, rate, messa
     [
         (np.zeros(5), None, r"got \(5,\)"),
         (np.zeros((5, 1)), None, "at least 2"),
-        ([[0.0, 1.0], [0.0, 1.5]], None, "Trial 1: .* 0 to P - 1 = 1, .* got 0 to 1.5"),
+        ([[0.0, 1.0], [0.0, 1.5]], None, "Trial 1: .* 0 to P - 1 = 1, .* got 1.5 at frame 1"),
         ([[0.0, 1.0]], ["near"], "distances is not a numeric array: got str, 'near'"),
         ([[0.0, np.nan]], None, "from 0 to P - 1"),
         ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 trial, got shape \(2,\)"),
