@@ -467,7 +467,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
             return np.array([np.interp(of_pattern, frames, curve) for curve in curves])[seen]
 
         errors = np.abs(at_keyframes(match.times) - known[seen])
-        widths = at_keyframes(match.intervals.measured().widths)
+        widths = at_keyframes(match.intervals.measured()[0])
         # As many as hold 90 % of new ones, too (split conformal prediction).
         n = len(errors)
         rank = whole(0.9 * (n + 1), "up")

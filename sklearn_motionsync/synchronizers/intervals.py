@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from itertools import chain
 
 import numpy as np
 
@@ -17,22 +17,9 @@ from ..utils.parallel import one_blas_thread
 _DOUBTFUL = 0.2
 
 
-class Measured(NamedTuple):
-    """How far the times of some trials may be off.
-
-    Attributes
-    ----------
-    widths : ndarray, shape (n_sequences, P)
-        Half-widths of 90 %, in frames; 0 where a warp is pinned.
-    is_normal : ndarray of bool, shape (n_sequences,)
-        As of `Uncertainty`.
-    reasons : list of str or None
-        Why each trial is doubtful.
-    """
-
-    widths: np.ndarray
-    is_normal: np.ndarray
-    reasons: list[str | None]
+# Half-widths (n_sequences, P) of 90 %, in frames, 0 where a warp is pinned; whether errors are
+# normal, bool (n_sequences,), as of `Uncertainty`; and why each trial is doubtful.
+Measured = tuple[np.ndarray, np.ndarray, list[str | None]]
 
 
 class Intervals:
@@ -78,12 +65,8 @@ class Intervals:
 
 def joined(parts: Iterable[Measured]) -> Measured:
     """What was measured of trials that were matched in parts."""
-    measured = list(parts)
-    return Measured(
-        np.concatenate([each.widths for each in measured]),
-        np.concatenate([each.is_normal for each in measured]),
-        [reason for each in measured for reason in each.reasons],
-    )
+    widths, is_normal, reasons = zip(*parts, strict=True)
+    return np.concatenate(widths), np.concatenate(is_normal), [*chain(*reasons)]
 
 
 def intervals_of(warper, arrays, times, factor, evidence, pinned=None):
@@ -133,6 +116,6 @@ def intervals_of(warper, arrays, times, factor, evidence, pinned=None):
                     "set, and its warps contradict each other (evidence_)"
                 )
             reasons.append(why)
-        return Measured(widths * factor, is_normal, reasons)
+        return widths * factor, is_normal, reasons
 
     return Intervals(times, measure)

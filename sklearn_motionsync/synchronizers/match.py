@@ -253,7 +253,7 @@ class Match:
     @property
     def reasons(self) -> list[str | None]:
         """Why each trial is doubtful, in words; None if it is not."""
-        return list(self._known_intervals().measured().reasons)
+        return list(self._known_intervals().measured()[2])
 
     def offsets_in(
         self,

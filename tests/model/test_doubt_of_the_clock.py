@@ -13,7 +13,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.model import find_departures
 from sklearn_motionsync.model.departures import Departure, explained_by_timing
-from sklearn_motionsync.synchronizers.intervals import Intervals, Measured
+from sklearn_motionsync.synchronizers.intervals import Intervals
 
 P = 60
 
@@ -23,7 +23,7 @@ def match_within(half_width, n=1):
     times = np.tile(np.arange(float(P)), (n, 1))
     match = Match(times)
     widths = np.full(times.shape, float(half_width))
-    match.intervals = Intervals(times, lambda: Measured(widths, np.ones(n), [None] * n))
+    match.intervals = Intervals(times, lambda: (widths, np.ones(n), [None] * n))
     return match
 
 
