@@ -1,7 +1,6 @@
 """Running trials, frame by frame: streams matched by rows of the trellis (Eqs. 16 and 17)."""
 
 import warnings
-from collections import deque
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,8 +20,6 @@ _MIN_LOG_WEIGHT = -80.0
 # Costs above so many times the typical one are those of other movements. Chosen on people of
 # HDM05, so that intervals of other actions are wide, and those under noise are not: docs/design.md.
 _UNUSUAL = 4
-# Frames that are kept in the history; a stream may run for days.
-_HISTORY_LENGTH = 100_000
 # Gaps longer than this share of the clock are not interpolated.
 _LONGEST_GAP = 0.25
 # Times that pass by more training frames a frame, or less than the inverse, are of another unit:
@@ -80,7 +77,6 @@ class Session:
 
     The first frame, (n_features,) or (n_streams, n_features), is still to be taken by ``step``.
     ``time`` is its time, in frames of the training trials, and later that of the last frame.
-    ``history`` has the phases of the last 100,000 frames.
     """
 
     def __init__(self, reference, frame, time):
@@ -92,7 +88,6 @@ class Session:
         self._course = Course(
             reference.n_frames, reference.duration, reference.cyclic, self.n_streams
         )
-        self.history = deque(maxlen=_HISTORY_LENGTH)
 
     def restart(self, stream):
         """Begin another trial of one stream with the next frame."""
@@ -113,10 +108,9 @@ class Session:
         phases = self._streams.estimate(self._resampler.elapsed)
         self._course.follow(time, phases.phase, phases.cycle)
         if frame.ndim == 1:
-            phases = each_value(phases, lambda values: values[0].item())
-        self.history.append(phases)
-        # The history has arrays of its own.
-        return phases if frame.ndim == 1 else each_value(phases, np.copy)
+            return LivePhase(*(values[0].item() for values in phases))
+        # The streams keep arrays of their own.
+        return LivePhase(*map(np.copy, phases))
 
     def time_left(self):
         """Frames of the training trials until the end of each stream, or of its cycle."""
@@ -385,15 +379,8 @@ def go_round(before, now, cycles, last, tolerance):
     return np.where(stays, 0, now), np.where(stays, 0, turns)
 
 
-def each_value(phases, function):
-    """The `LivePhase` of a function of every value."""
-    return LivePhase(*map(function, phases))
-
-
 def stack_phases(phases):
     """The `LivePhase` of each frame as one of arrays."""
-    if not phases:
-        return LivePhase(*np.empty((5, 0)), cycle=np.empty(0, dtype=np.intp))
     return LivePhase(*map(np.array, zip(*phases, strict=True)))
 
 

@@ -316,17 +316,6 @@ class OnlineSynchronizer(LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, 
         left = self._reference.duration if session is None else session.time_left()
         return left if self.frame_rate is None else left / self.frame_rate
 
-    @property
-    def history(self) -> LivePhase:
-        """What ``step`` estimated since the last ``reset`` of all: `LivePhase` of arrays.
-
-        Of a long stream these are the last 100,000 frames.
-        """
-        check_is_fitted(self, "mean_")
-        if self._session is None:
-            return stack_phases([])
-        return stack_phases(self._session.history)
-
     def track(
         self,
         X: TrialsLike,
