@@ -109,8 +109,7 @@ class Session:
         self._course.follow(time, phases.phase, phases.cycle)
         if frame.ndim == 1:
             return LivePhase(*(values[0].item() for values in phases))
-        # The streams keep arrays of their own.
-        return LivePhase(*map(np.copy, phases))
+        return phases
 
     def time_left(self):
         """Frames of the training trials until the end of each stream, or of its cycle."""
@@ -150,7 +149,7 @@ class Course:
             self._period = np.where(whole, period, self._period)
             self._begin = np.where(first, time, np.where(rises, begin, self._begin))
             self._one_begins = False
-        self._cycle = cycle
+        self._cycle = np.array(cycle)
 
     def time_left(self):
         """The time until each stream ends, or its cycle; (n_streams,).
@@ -196,8 +195,6 @@ class Streams:
         self._observed_share = np.ones(n_streams)
         # Of the features, the share that was observed in those samples.
         self._feature_share = np.ones(n_streams)
-        # Phases and their bounds, rates and confidences, once computed, until the next sample.
-        self._cached = None
 
     def restart(self, stream):
         """Begin another trial of one stream with the next sample."""
@@ -207,7 +204,6 @@ class Streams:
         self._cycles[stream] = 0
         self._feature_share[stream] = 1
         self._phases[:, stream] = 0
-        self._cached = None
 
     def update(self, sample):
         """Take a sample (n_streams, n_features), one frame of the clock after the one before."""
@@ -237,18 +233,11 @@ class Streams:
 
     def estimate(self, elapsed):
         """Phases with bounds, rates and confidences, so many samples after the last one."""
-        if self._cached is None:
-            gains = gains_of(self.trellis.costs)
-            excess = np.maximum(self.mean_cost / self.reference.typical_cost, 1)
-            phases = np.concatenate([self._phases[-1:], self._bounds(gains, excess)])
-            confidence, cycle = (
-                self._confidences(gains, excess),
-                self._cycles + self.trellis.attempts,
-            )
-            self._cached = phases, self._rates(), confidence, cycle
-        phases, rate, confidence, cycle = self._cached
-        phases = phases + rate * elapsed
+        gains, rate = gains_of(self.trellis.costs), self._rates()
+        excess = np.maximum(self.mean_cost / self.reference.typical_cost, 1)
+        phases = np.concatenate([self._phases[-1:], self._bounds(gains, excess)]) + rate * elapsed
         phase, lower, upper = phases if self.reference.cyclic else np.minimum(phases, self._last)
+        confidence, cycle = self._confidences(gains, excess), self._cycles + self.trellis.attempts
         return LivePhase(np.minimum(phase, self._last), rate, confidence, lower, upper, cycle)
 
     def _moves(self, velocity):
@@ -276,7 +265,7 @@ class Streams:
         cost = (costs - self._path_cost) / np.where(seen, observed, 1)
         self.mean_cost += weight * seen * (cost - self.mean_cost)
         self._feature_share += weight * seen * (observed - self._feature_share)
-        self._path_cost, self._cached = costs, None
+        self._path_cost = costs
 
     def _rates(self):
         """Slopes of the phases over the window; before the first sample the rate is 1."""

@@ -115,7 +115,6 @@ class Trellis:
         self.pad = int(np.abs(self.slopes).max())
         self.centre = self.width + self.pad
         self.unit_group = self.group_of_step[table.steps == table.subframes][0]
-        self._windows = {}
 
     def weighed(self, squares, base, moving, unseen=None):
         """Squared distances of samples as they count, given the samples with all columns."""
@@ -281,9 +280,7 @@ class Trellis:
         up = int(self.slopes.max()) * p
         if self.running:
             return [0] * n_frames, np.minimum(self.width, up).tolist()
-        if n_frames not in self._windows:
-            down = self.table.subframes * p
-            low = -np.minimum(self.width, np.minimum(down, up[::-1]))
-            high = np.minimum(self.width, np.minimum(up, down[::-1]))
-            self._windows = {n_frames: (low.tolist(), high.tolist())}
-        return self._windows[n_frames]
+        down = self.table.subframes * p
+        low = -np.minimum(self.width, np.minimum(down, up[::-1]))
+        high = np.minimum(self.width, np.minimum(up, down[::-1]))
+        return low.tolist(), high.tolist()
