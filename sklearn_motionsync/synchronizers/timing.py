@@ -29,6 +29,8 @@ from .training import with_confidence
 
 # The appended features: the offset, and its standard errors.
 _OFFSET, _ERROR = "offset", "offset_error"
+# Fitted attributes of the synchronizer that are also those of the channel.
+_SHARED = "n_frames_", "n_features_in_", "feature_names_in_", "_fitted_on_rows"
 # Synchronizers whose matches tell how sure they are.
 _TELLING = (DenseSynchronizer, PartSynchronizer)
 
@@ -169,20 +171,10 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
             if name in getattr(sync, "feature_names_in_", ()):
                 what = "offset" if name == _OFFSET else "errors"
                 raise ValueError(f"A feature of X has the name of the {what}, {name!r}: rename it.")
-        self.synchronizer_ = sync
-        for name in ("n_frames_", "_fitted_on_rows"):
-            setattr(self, name, getattr(sync, name))
+        self.__dict__.pop("feature_names_in_", None)
+        shared = {name: value for name, value in vars(sync).items() if name in _SHARED}
+        self.__dict__.update(shared, synchronizer_=sync)
         return self
-
-    @property
-    def n_features_in_(self) -> int:
-        """Features of a frame (columns, for 2-D input)."""
-        return self.synchronizer_.n_features_in_
-
-    @property
-    def feature_names_in_(self) -> np.ndarray:
-        """Names of the features; only if the input had names."""
-        return self.synchronizer_.feature_names_in_
 
     def fit_transform(self, X: TrialsLike, y: object = None, **params: Any) -> Transformed:
         """Fit, and transform the same trials.
