@@ -429,10 +429,8 @@ def _match_portion(cycle, values):
 
 def _upsample(pattern):
     """The closed pattern at `_SUBFRAMES` positions per sample, by linear interpolation."""
-    share = (np.arange(_SUBFRAMES) / _SUBFRAMES)[:, np.newaxis]
-    following = np.roll(pattern, -1, axis=0)[:, np.newaxis]
-    fine = (1 - share) * pattern[:, np.newaxis] + share * following
-    return fine.reshape(-1, pattern.shape[1])
+    closed = np.concatenate([pattern, pattern[:1]])
+    return normalise([closed], len(closed), _SUBFRAMES)[0, :-1]
 
 
 def circular_peak(curve):
