@@ -135,10 +135,6 @@ class Features(NamedTuple):
         weights = gaussian_filter1d(columns[..., :1], sigma, axis=1, mode="nearest")
         return np.concatenate([weights, columns[..., 1:]], axis=2)
 
-    def replace(self, **params):
-        """The same features but for these attributes."""
-        return self._replace(**params)
-
     @property
     def degree(self):
         """Power of the unit of the data in squares of features."""
@@ -187,7 +183,7 @@ class Features(NamedTuple):
             return None
         if self.metric is None:
             return plain
-        return plain.replace(metric=self.metric.part(self.unit.originals[columns], compared))
+        return plain._replace(metric=self.metric.part(self.unit.originals[columns], compared))
 
     def positions(self, arrays, n_frames):
         """Trials on the clock (Eq. 7), in the unit."""
@@ -333,7 +329,7 @@ def learn_features(features, positions, settings, n_exemplars, warp_smoothing):
         return None
     metric, evidence = learnt
     shares = metric.shares(velocity, poses), energy_shares(velocity)
-    return features.replace(metric=metric), *shares, evidence
+    return features._replace(metric=metric), *shares, evidence
 
 
 # -- warps to the pattern ----------------------------------------------------------------------

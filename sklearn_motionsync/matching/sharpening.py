@@ -131,12 +131,6 @@ class Sharpener(NamedTuple):
         """How far warps go to where the local match places them, frame by frame: (P,)."""
         return self.gain * _smooth_along(self.precision)
 
-    def agreement_of_all(self, n_features):
-        """The agreement in each of all features; NaN for those that are not compared."""
-        agreement = np.full(n_features, np.nan)
-        agreement[self.features] = self.agreement
-        return agreement
-
     def __call__(self, positions, times, reach):
         """Sharpened warps (n_sequences, P).
 

@@ -401,7 +401,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
             "interval_factor_": 1.0,
             "lengths_": clock.lengths,
             "examples_": clock.examples,
-            "features_": features.replace(anchors=None, weighs=False),
+            "features_": features._replace(anchors=None, weighs=False),
             "_filler": training.filler,
             "_settings": compared.settings,
             "_warper": final.warper,
@@ -545,5 +545,7 @@ def _described(finish, n_features):
     """What sharpens warps, as ``sharpening_``; None if nothing does."""
     if not isinstance(finish, Sharpener):
         return None
-    agreement = finish.agreement_of_all(n_features)
+    # NaN for what is not compared.
+    agreement = np.full(n_features, np.nan)
+    agreement[finish.features] = finish.agreement
     return Bunch(agreement=agreement, width=finish.width, trust=finish.trust)

@@ -103,7 +103,7 @@ def learn_metric(clock, *, cost, metric, consensus, smoothness, max_offset, max_
         learning = PathSettings(smoothness, min(narrow, _LEARNING_OFFSET), max_rate)
         learnt = learn_features(plain, clock.positions[rows], learning, consensus, FINE_SMOOTHING)
     if learnt is None:
-        plain = plain.replace(velocity_smoothing=SMOOTHING)
+        plain = plain._replace(velocity_smoothing=SMOOTHING)
         settings = PathSettings(smoothness, narrow, max_rate)
         return MetricStep(plain, settings, None, weigh_evidence(None, 0))
     features, share, energy, evidence = learnt
@@ -173,7 +173,7 @@ def match_pairs(clock, step, wanted, *, trials, names, random_state, n_jobs, pro
         is_rounded = searched.single and positions.dtype != compared.dtype
         if is_rounded and rounding > _LARGEST_ROUNDING * sums.min():
             # Nearly equal trials: single precision does not tell them apart.
-            searched, compared, matcher = search(searched.replace(single=False))
+            searched, compared, matcher = search(searched._replace(single=False))
             sums, rounding = sums_and_rounding(searched, compared, matcher)
         median = median_of_sums(sums, references, rounding)
     if searched is not features:

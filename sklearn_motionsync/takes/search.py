@@ -474,7 +474,7 @@ class Proposer(NamedTuple):
         )
         # The filter of velocities is as wide in a portion as in the pattern.
         share = (n_frames - 1) / (n_frames - 1 + 2 * trellis.width)
-        features = features.replace(velocity_smoothing=share * features.velocity_smoothing)
+        features = features._replace(velocity_smoothing=share * features.velocity_smoothing)
         return cls(features, base, trellis, scales(shortest, longest), shortest, longest)
 
     def __call__(self, take):

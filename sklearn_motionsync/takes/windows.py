@@ -74,7 +74,7 @@ class WindowDissimilarity:
         self._n_positions = min(n_frames, _MAX_POSITIONS)
         # The features at the pace of so many positions.
         pace = (self._n_positions - 1) / (n_frames - 1)
-        self._features = synchronizer.features_.replace(pace=pace)
+        self._features = synchronizer.features_._replace(pace=pace)
         self._length = LogMoments.of(lengths).standardize
         self._typical_length = np.exp(np.log(lengths).mean())
         count = len(examples)
