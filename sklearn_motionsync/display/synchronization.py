@@ -260,14 +260,14 @@ class SynchronizationDisplay(Display):
 
     def _draw_offsets(self, axis, clock, colors):
         """Draw offsets from their mean, and bands around them if the match tells intervals."""
-        coverage = None if self.doubtful is None else _COVERAGE
-        offsets, bands = self.match.offsets_in(self.axis.unit, coverage=coverage), ""
-        if coverage is not None:
-            offsets, lower, upper = offsets
-            bounds = lower - offsets.mean(axis=0), upper - offsets.mean(axis=0)
+        match, unit, bands = self.match, self.axis.unit, ""
+        offsets = match.offsets_in(unit)
+        mean = offsets.mean(axis=0)
+        if self.doubtful is not None:
+            warps = (Match(bound).of_trials(match.facts) for bound in match.interval(_COVERAGE))
+            bounds = (warp.offsets_in(unit) - mean for warp in warps)
             self.intervals_ = self._draw_intervals(axis, clock, *bounds, colors)
             bands = f"shaded: {100 * _COVERAGE:g} % intervals"
-        mean = offsets.mean(axis=0)
         self.offsets_ = self._draw_trials(axis, [clock] * len(offsets), offsets - mean, colors)
         axis.axhline(0, color=COLORS["pattern"], linestyle="--", linewidth=1)
         second = "; ".join(filter(None, (bands, self._describe_doubtful("dotted: "))))

@@ -260,8 +260,6 @@ class Match:
         unit: Unit,
         X: TrialsLike | ValuesLike | None = None,
         frame_rate: float | ValuesLike | None = None,
-        *,
-        coverage: float | None = None,
     ) -> np.ndarray:
         """How much later than the pattern trials are at every frame of it, in a unit of time.
 
@@ -279,27 +277,19 @@ class Match:
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             For seconds: frames per second of X. By default what tables tell: an index in seconds,
             or ``attrs["frame_rate"]`` of `io.read_motion`; or else what ``match`` was told.
-        coverage : float, default=None
-            Probability of the intervals of ``interval``, such as 0.9. None for none.
 
         Returns
         -------
-        ndarray, shape (n_sequences, P), or (3, n_sequences, P)
-            Positive where a trial is later than the pattern. With a coverage the offsets, and
-            the lower and upper bounds of their intervals.
+        ndarray, shape (n_sequences, P)
+            Positive where a trial is later than the pattern.
 
         Raises
         ------
         ValueError
             If there is no such unit, or trials or their frame rate are not known for seconds; and
-            as from ``seconds``, and with a coverage from ``interval``.
+            as from ``seconds``.
         """
-        offsets = self._in_unit(self.offsets, unit, X, frame_rate)
-        if coverage is None:
-            return offsets
-        frames = np.arange(self.times.shape[1])
-        bounds = (self._in_unit(b - frames, unit, X, frame_rate) for b in self.interval(coverage))
-        return np.stack([offsets, *bounds])
+        return self._in_unit(self.offsets, unit, X, frame_rate)
 
     def to_frame(
         self,

@@ -154,13 +154,16 @@ def test_bands_are_the_intervals_of_the_match_in_any_unit(bunch, pipe):
     match, given = Match.from_estimator(pipe, bunch.data), {"features": 0, "frame_rate": 50}
     for unit in ("frames", "percent", "seconds"):
         display = SynchronizationDisplay.from_estimator(pipe, bunch.data, unit=unit, **given)
-        offsets, *bounds = match.offsets_in(unit, bunch.data, 50, coverage=0.9)
-        lower, upper = (bound - offsets.mean(axis=0) for bound in bounds)
+        given_to = unit, bunch.data, 50
+        times = match.to_frame(*given_to)["time"].to_numpy().reshape(9, -1)
+        offsets = match.offsets_in(*given_to)
+        mean = times - offsets + offsets.mean(axis=0)
+        lower, upper = (bound - mean for bound in match.interval(0.9, *given_to))
         clock = display.pattern_[0].get_xdata()
         corners = np.array(segments(display.intervals_))
         np.testing.assert_allclose(corners[:, :-1, 0], [[*clock, *clock[::-1]]] * 9)
-        np.testing.assert_allclose(corners[:, :P, 1], lower)
-        np.testing.assert_allclose(corners[:, P:-1, 1], upper[:, ::-1])
+        np.testing.assert_allclose(corners[:, :P, 1], lower, atol=1e-12)
+        np.testing.assert_allclose(corners[:, P:-1, 1], upper[:, ::-1], atol=1e-12)
     assert display.axes_[-1].get_title().endswith("shaded: 90 % intervals")
     assert display.intervals_.get_zorder() < display.offsets_.get_zorder()
 

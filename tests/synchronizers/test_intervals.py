@@ -91,11 +91,6 @@ def test_units(fitted, bending_aspace):
         np.testing.assert_allclose(got, wanted / (P - 1) * last)
     with pytest.raises(ValueError, match="The frame rate of trial 0 is not known"):
         match.interval(0.9, "seconds")
-    found = match.offsets_in("seconds", X, 50.0, coverage=0.9)
-    for got, wanted in zip(found, (match.times, *frames), strict=True):
-        np.testing.assert_allclose(got, (wanted - np.arange(P)) / (P - 1) * last, atol=1e-12)
-    percent = match.offsets_in("percent", coverage=0.9)
-    np.testing.assert_allclose(percent[0], match.offsets_in("percent"))
 
 
 def test_table(fitted, bending_aspace):
