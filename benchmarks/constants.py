@@ -135,6 +135,7 @@ FILTERS = "matching.filters"
 LEARNING, PARTS = "synchronizers.learning", "synchronizers.parts"
 MATCHER, METRIC, COSTS = "matching.matcher", "matching.metric", "matching.costs"
 SHARPENING, REFINEMENT = "matching.sharpening", "matching.refinement"
+CONSENSUS = "matching.consensus"
 # Not here, as nothing below depends on them: what guards against rounding, what bounds memory, what
 # only gaps, key-frames, intervals, warnings, or more than 100 trials or frames meet.
 CONSTANTS = [
@@ -174,7 +175,7 @@ CONSTANTS = [
     ),
     Constant(FILTERS, "_NOISE", "share of noise that is allowed", off=np.inf),
     Constant(FILTERS, "_ORDER", "order of the differences that are noise"),
-    Constant(FILTERS, "LEAST_SIGMA", "narrowest Gaussian on frames", also=(REFINEMENT,)),
+    Constant(FILTERS, "LEAST_SIGMA", "narrowest Gaussian on frames", also=(CONSENSUS,)),
     Constant(SHARPENING, "_FINEST", "narrowest smoothing", off=0.001),
     Constant(SHARPENING, "_SLOW", "speed below which roots are linear", off=1e-6),
     Constant(SHARPENING, "_SUBFRAMES", "positions a frame", off=1, half=2),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .counting import ROUNDING
-from .filters import smooth
+from .filters import LEAST_SIGMA, smooth
 from .warps import evaluate_warps
 
 
@@ -81,7 +81,7 @@ def smooth_warps(times, reach, width, about=0.0):
     n_frames = times.shape[1]
     frames, sigma = np.arange(n_frames), width * (n_frames - 1)
     offsets = times - frames - about
-    if sigma > 1 / 3:
+    if sigma > LEAST_SIGMA:
         offsets = smooth(offsets[:, :, np.newaxis], sigma)[:, :, 0]
         offsets[:, [0, -1]] = 0
     times = frames + np.clip(offsets + about, -reach, reach)

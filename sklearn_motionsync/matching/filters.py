@@ -16,8 +16,8 @@ from .counting import ROUNDING
 SMOOTHING, FINE_SMOOTHING = 0.03, 0.02
 # Standard deviation, in samples, from which Fourier transforms are the faster filter.
 _WIDE = 10
-# Narrowest Gaussian that is one on a grid of frames.
-LEAST_SIGMA = 0.35
+# Narrowest Gaussian that is one on a grid of frames: the derivative of a narrower one is none.
+LEAST_SIGMA = 1 / 3
 # Order of the differences whose variance is taken for that of white noise: docs/design.md.
 _ORDER = 6
 # Share of white noise in the energy of velocities of one feature that is small.
@@ -45,8 +45,7 @@ def smooth(on_clock, sigma, order=0):
     n_sequences = len(on_clock)
     out = np.empty_like(on_clock)
     reach = min(math.ceil(4 * sigma - ROUNDING) + 1, on_clock.shape[1] - 1)
-    # Below a third of a sample the derivative of a Gaussian is no derivative any more.
-    sigma = float(max(sigma, 1 / 3))
+    sigma = float(max(sigma, LEAST_SIGMA))
     kernel = _kernel(sigma, order)
     # Half a dozen copies of the sequences that are filtered at a time.
     memory = get_config()["working_memory"] * 2**20 / 6
@@ -111,9 +110,7 @@ def noise_width(positions):
         In frames, at most 9.3 % of the clip, of noise alone; 0 if the noise is too small for any
         smoothing.
     """
-    velocity = smooth(
-        positions, max(FINE_SMOOTHING * (positions.shape[1] - 1), LEAST_SIGMA), order=1
-    )
+    velocity = smooth(positions, FINE_SMOOTHING * (positions.shape[1] - 1), order=1)
     energy = np.square(velocity).mean(axis=(0, 1))
     moves = energy > 0
     if not moves.any():

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
-from .filters import LEAST_SIGMA, SMOOTHING, smooth
+from .filters import SMOOTHING, smooth
 from .metric import LONGEST_LAG
 from .sizes import EQUAL
 
@@ -131,7 +131,7 @@ class Refiner(NamedTuple):
         lags = np.arange(1, math.ceil(LONGEST_LAG * n_frames))
         share = 1 - lags / (LONGEST_LAG * n_frames)
         base_slope = CubicSpline(frames, base)(frames, 1)
-        width = max(SMOOTHING * (n_frames - 1), LEAST_SIGMA)
+        width = SMOOTHING * (n_frames - 1)
         for x, tau, row in zip(_smoothed(poses, self.noise_width), times, errors, strict=True):
             spline = CubicSpline(frames, x)
             fitted, gain = _fit_gain(base[np.newaxis], spline(tau)[np.newaxis])
@@ -168,7 +168,7 @@ class Refiner(NamedTuple):
 
 
 def _smoothed(poses, width):
-    return smooth(poses, width) if width > LEAST_SIGMA else poses
+    return smooth(poses, width) if width else poses
 
 
 def unexplained_variance(pattern, aligned, noise):
