@@ -125,7 +125,8 @@ def outputs(estimator, X):
     if hasattr(estimator, "transform"):
         results += [np.asarray(x) for x in estimator.transform(X)]
     if hasattr(estimator, "match"):
-        results += list(estimator.match(X))
+        match = estimator.match(X)
+        results += [match.times, match.distances]
     if isinstance(estimator, OnlineSynchronizer):
         results += list(zip(*estimator.track(X), strict=True))
     if isinstance(estimator, MotionTracker):

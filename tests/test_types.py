@@ -149,7 +149,7 @@ LinearSynchronizer().fit(to_frame(tables)).set_output(transform="pandas")
 LinearSynchronizer().fit(np.stack(X)[:, :, 0])
 LinearSynchronizer().fit([[1.0, 2.0, 4.0], [1.0, 3.0, 4.0]])
 LinearSynchronizer().fit(np.array([*X, X[0][:9]], dtype=object))
-offsets, times, distances = sync.match(X)
+sync.match(X).times.shape
 sync.match(X).offsets_in("seconds", X, frame_rate=50)[0].tolist()
 Match.from_estimator(make_pipeline(sync), X).warp(X).shape
 LinearSynchronizer().fit(X, keyframes=[[5, 9], [6, 8], np.array([4, 9])])

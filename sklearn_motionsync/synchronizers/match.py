@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import reprlib
-from collections.abc import Iterator
 from copy import copy
 from numbers import Real
 from typing import Any, Self
@@ -80,10 +79,6 @@ class Match:
     ValueError
         If times are not of shape (n_sequences, P) with at least two frames, decrease, or are not
         within the clock; or if there is not one distance a trial.
-
-    Notes
-    -----
-    ``offsets, times, distances = match`` unpacks it.
 
     Examples
     --------
@@ -529,9 +524,6 @@ class Match:
     def _stretched(self, times, facts):
         """Frames of the pattern in frames of each trial."""
         return times * (facts.lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
-
-    def __iter__(self) -> Iterator[np.ndarray]:
-        return iter((self.offsets, self.times, self.distances))
 
     def __repr__(self):
         n_sequences, n_frames = self.times.shape

@@ -28,12 +28,12 @@ def test_paper_settings_equal_all_admissible_paths(pattern):
         sums = [sum(brute_force(x, y, *settings)[0] for y in X) for x in X]
         np.testing.assert_allclose(sync.global_distances_, sums, rtol=1e-10)
         assert sync.pattern_index_ == np.argmin(sums)
-    offsets, times, distances = sync.match(X)
+    match = sync.match(X)
     for m, x in enumerate(X):
         best, paths = brute_force(X[sync.pattern_index_], x, *settings)
-        np.testing.assert_allclose(distances[m], best, rtol=1e-10, atol=1e-12)
-        assert tuple(times[m].astype(int)) in paths
-        np.testing.assert_array_equal(offsets[m], times[m] - np.arange(7))
+        np.testing.assert_allclose(match.distances[m], best, rtol=1e-10, atol=1e-12)
+        assert tuple(match.times[m].astype(int)) in paths
+        np.testing.assert_array_equal(match.offsets[m], match.times[m] - np.arange(7))
 
 
 @pytest.mark.parametrize("cost", COSTS)

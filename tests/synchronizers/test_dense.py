@@ -62,14 +62,13 @@ def test_pattern_by_index_or_array(estimator, warps):
 def test_warps_are_pinned_monotone_and_bounded(refine, consensus, max_offset, warps):
     settings = {"max_offset": max_offset, "consensus": consensus, "refine": refine}
     sync = DenseSynchronizer(40, max_rate=3, **settings).fit(warps)
-    offsets, times, _ = sync.match(warps)
-    np.testing.assert_array_equal(times, np.arange(40) + offsets)
+    times = sync.match(warps).times
     assert (times[:, 0] == 0).all()
     assert (times[:, -1] == 39).all()
     rates = np.diff(times)
     assert rates.min() >= 0
     assert rates.max() <= 3 + 1e-9 or consensus or refine
-    assert np.abs(offsets).max() <= max_offset * 40
+    assert np.abs(times - np.arange(40)).max() <= max_offset * 40
 
 
 def test_no_offset_is_linear_normalisation(warps):
