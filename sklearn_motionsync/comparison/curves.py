@@ -15,7 +15,7 @@ from ..inputs.numbers import check_finite
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..synchronizers.dense import DenseSynchronizer
-from ..synchronizers.match import Match, check_unit, match_of_times
+from ..synchronizers.match import Match, check_unit
 from ..utils.pipelines import Routed, route_to_synchronizer
 
 # Features are left out of a match in so many parts.
@@ -86,7 +86,7 @@ class AlignedCurves(NamedTuple):
             clock *= 100 / last
         elif unit == "seconds":
             clock *= np.median(reached.facts.durations()) / last
-        even = match_of_times(np.tile(np.arange(last + 1.0), (n, 1)), n).warp(sequences)
+        even = Match(np.tile(np.arange(last + 1.0), (n, 1))).warp(sequences)
         return cls(names, units, match.warp(sequences), even, offsets, clock, unit, match, reached)
 
     def offsets_of_others(self):

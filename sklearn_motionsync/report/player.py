@@ -26,7 +26,7 @@ from ..inputs.keyframes import Keyframes
 from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import NamesLike, NumbersLike, Path, Table, TrialsLike, ValuesLike
 from ..inputs.wording import counted
-from ..synchronizers.match import Match, match_of_times
+from ..synchronizers.match import Match
 from ..utils.files import check_path
 from ..utils.pipelines import transform_through, union_transformers
 from .page import Page, paragraph, read_part
@@ -246,7 +246,7 @@ def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
     longest, positions = max(longest, 2), []
     for points, _, _ in bodies:
         if len(points) > longest:
-            even = match_of_times([np.arange(float(longest))], 1)
+            even = Match([np.arange(float(longest))])
             flat = points.reshape(len(points), -1)
             points = even.warp([flat])[0].reshape(longest, *points.shape[1:])
         positions.append(points)

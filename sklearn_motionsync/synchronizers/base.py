@@ -242,8 +242,7 @@ class Synchronizer(LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, Bas
         >>> bool((aligned == sync.transform(gait.data)).all())
         True
         """
-        if fill is not None:
-            check_fill(fill)
+        check_fill(fill)
         trials = self.check_trials(X)
         check_match(match, len(trials), self.n_frames_, type(self).__name__)
         # What was hidden in the match is hidden here, too.
@@ -328,8 +327,7 @@ class Synchronizer(LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, Bas
         return self._learnt(training, clock, pattern, clock.poses)
 
     def _warp(self, X, fill=None, **params):
-        if fill is not None:
-            check_fill(fill)
+        check_fill(fill)
         # Further parameters are given for all trials at once.
         source = None if params else self._read_in_parts(X)
         if source is None:

@@ -579,16 +579,6 @@ def check_coverage(coverage):
     return float(coverage)
 
 
-def match_of_times(times, n_sequences) -> Match:
-    """A match without distances, of given warps of so many trials."""
-    if np.ndim(times) > 0 and len(times) != n_sequences:
-        raise ValueError(
-            f"times must have shape (n_sequences, P), one row for each of the {n_sequences} "
-            f"trials; got {np.shape(times)}."
-        )
-    return Match(times)
-
-
 def check_match(match, n_sequences, n_frames, name):
     """Refuse the match of a synchronizer of this name unless it has all trials."""
     shape = np.shape(getattr(match, "times", None))
