@@ -113,8 +113,6 @@ def make_bending(
             Frame (with fraction) of five moments in each trial.
         keyframe_names : list of str
             Names of these moments.
-        keyframe_times : ndarray (5,)
-            These moments on the scale of ``times``.
         skeleton : Skeleton
             The paper's skeleton of fifteen joints.
         target, actor, take : ndarray of str (n_trials,)
@@ -158,7 +156,6 @@ def make_bending(
         times=times,
         keyframes=np.array(keyframes),
         keyframe_names=list(_KEYFRAMES),
-        keyframe_times=moments,
         skeleton=Skeleton.paper(),
         target=np.full(n_trials, "bending"),
         actor=np.array([f"actor{k}" for k in numbers % n_actors]),

@@ -55,7 +55,7 @@ _WAVE, _WAVE_WITHIN = 1.5, 0.3
 _RANGE, _FORCE_PER_DEGREE = 0.06, 0.02
 # Noise of the force in body weights, as a share of that of the angles in degrees.
 _FORCE_NOISE = 0.01
-# The number of moments of the pace of a person, and of the typical curves of the groups.
+# The number of moments of the pace of a person, and of the times of the groups.
 _N_PACE = 501
 _N_MOMENTS = 101
 
@@ -135,8 +135,6 @@ def make_gait(
             and the heel strikes: ``(n_people, 6 * n_cycles + 1)``.
         keyframe_names : list of str
             Names of these moments; in takes with the number of the cycle.
-        keyframe_times : ndarray (n_keyframes,)
-            These moments on the scale of ``times``.
         person, group : ndarray of str (n_trials,)
             The person, and the group, "A" or "B".
         cycle : ndarray of int (n_trials,)
@@ -149,11 +147,8 @@ def make_gait(
             Their units: degrees, and body weights.
         frame_rate : float
             Frames per second, as given.
-        group_curves : ndarray (2, 101, 4)
-            The typical curves of each group at 101 even moments of ``times``, without differences
-            in timing.
         group_times : ndarray (2, 101)
-            The share of the cycle that is over at these moments in each group.
+            The share of the cycle that is over at 101 even moments of ``times`` in each group.
 
     Raises
     ------
@@ -184,18 +179,17 @@ def make_gait(
         recorded.append(record(generator, walk, n_frames, noise))
     gait = _describe_takes(recorded, frame_rate) if takes else _describe_cycles(recorded)
     people = np.arange(n_people).repeat(len(gait.data) // n_people)
-    gait.update(_describe_groups(people, amplitude, timing))
+    gait.update(_describe_groups(people, timing))
     gait.update(feature_names=list(_CURVES), units=list(_UNITS), frame_rate=float(frame_rate))
     return gait
 
 
-def _describe_groups(people, amplitude, timing):
-    """The person and group of each trial, and the typical movement of each group."""
+def _describe_groups(people, timing):
+    """The person and group of each trial, and the typical timing of each group."""
     moments = np.linspace(0, 1, _N_MOMENTS)
     return {
         "person": np.array([f"person{i}" for i in people]),
         "group": np.array([_GROUPS[i % 2] for i in people]),
-        "group_curves": np.stack([_typical_curves(moments, a) for a in (0.0, amplitude)]),
         "group_times": np.stack([_shift_times(moments, t) for t in (0.0, timing)]),
     }
 
@@ -286,16 +280,6 @@ def _shift_times(moments, timing):
     return moments + timing / 100 * np.sin(np.pi * moments**exponent) ** 2
 
 
-def _typical_curves(moments, amplitude):
-    """Angles and force without variation: (n_moments, 4)."""
-    curves = []
-    for name, anchors in _CURVES.items():
-        at = np.arange(-1, 2)[:, np.newaxis] + np.array(list(anchors))
-        values = np.tile(_anchor_values(name, amplitude), 3)
-        curves.append(PchipInterpolator(at.ravel(), values)(moments))
-    return np.stack(curves, axis=1)
-
-
 # -- the recordings of it ---------------------------------------------------------------
 
 
@@ -345,14 +329,12 @@ def _describe_cycles(people):
         times=list(times),
         keyframes=np.array(keyframes),
         keyframe_names=list(_KEYFRAMES),
-        keyframe_times=_KEY_MOMENTS.copy(),
         cycle=np.tile(np.arange(1, len(people[0]) + 1), len(people)),
     )
 
 
 def _describe_takes(people, frame_rate):
     n_cycles, names = len(people[0][-1]), ["heel strike", *_KEYFRAMES]
-    moments = np.arange(n_cycles)[:, np.newaxis] + np.array([0, *_KEY_MOMENTS])
     data, times, all_keyframes, events = [], [], [], []
     for signals, phases, strikes, keyframes in people:
         data.append(signals)
@@ -375,7 +357,6 @@ def _describe_takes(people, frame_rate):
         keyframes=np.array(all_keyframes),
         keyframe_names=[f"{name} {c + 1}" for c in range(n_cycles) for name in names]
         + [f"heel strike {n_cycles + 1}"],
-        keyframe_times=np.append(moments, n_cycles),
         events=events,
     )
 

@@ -19,7 +19,7 @@ def test_times_and_keyframes_fit_the_frames(bending):
         assert times[-1] == 1
         assert (np.diff(times) > 0).all()
         at = np.interp(bending.keyframes[i], np.arange(len(times)), times)
-        np.testing.assert_allclose(at, bending.keyframe_times)
+        np.testing.assert_allclose(at, [0.12, 0.30, 0.48, 0.68, 0.88])
     lengths = [len(x) for x in bending.data]
     assert len(set(lengths)) > 10
     assert 75 <= min(lengths) < 90
