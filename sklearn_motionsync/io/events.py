@@ -39,8 +39,6 @@ _HELP = (
 )
 # Columns of a table of events, in lower case.
 _EVENTS, _CONTEXT, _FRAMES = ("event", "label"), "context", ("frame", "frames")
-# Names of the column of trials, if one column names them.
-_TRIALS = [TRIAL, "trial"]
 # Frames beyond an end that are rounding.
 _MARGIN = 0.5
 
@@ -460,7 +458,7 @@ def _keys(columns, levels):
     """The columns of a table of events with the labels of trials."""
     wanted = [[str(level).strip().casefold()] for level in levels]
     if len(levels) == 1:
-        wanted[0] += _TRIALS
+        wanted[0].append(TRIAL)
     keys = [next((columns[n] for n in names if n in columns), None) for names in wanted]
     if None in keys:
         raise ValueError(
