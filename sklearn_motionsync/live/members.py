@@ -37,9 +37,6 @@ class Track(NamedTuple):
     rates : ndarray, shape (n_frames,)
         Weighted medians of the pace: 1 is the mean of the training trials, 2 twice as fast,
         0 at the end of the movement.
-    effective_sizes : ndarray, shape (n_frames,)
-        Effective sample sizes of the particles, ``1 / sum w^2``. Of a smoothed take: the number of
-        different particles on its paths.
     lost : ndarray of bool, shape (n_frames,)
         Whether velocities or poses are improbable at all phases.
 
@@ -64,7 +61,6 @@ class Track(NamedTuple):
     covariances: np.ndarray
     phases: np.ndarray
     rates: np.ndarray
-    effective_sizes: np.ndarray
     lost: np.ndarray
 
     def __repr__(self):
@@ -143,7 +139,6 @@ class RunningTake:
             *pool((self.phases.estimate, self.pooled.estimate), self.evidence, self.model),
             weighted_median(particles.phases, particles.weights),
             weighted_median(particles.rates(self.model.clock), particles.weights),
-            particles.effective_size,
             self.phases.lost,
         )
 
@@ -233,7 +228,6 @@ def _smooth_frame(model, past, path, evidence, on_paths, without):
         *pool(estimates, evidence, model),
         np.median(past.particles.phases[path]),
         np.median(past.particles.rates(model.clock)[path]),
-        float(len(np.unique(path))),
         past.lost,
     )
 

@@ -90,8 +90,6 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         Of the Matern-3/2 process, in frames of the training trials.
     rate_spread_ : float
         Standard deviation of the log rate.
-    rate_memory_ : float
-        Frames of the training trials after which its correlation is 1/e.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -226,7 +224,7 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         self.mean_ = model.mean.astype(trials[0].dtype)
         self.covariance_ = model.process.covariance
         self.length_scale_ = float(np.sqrt(3) / model.process.decay)
-        self.rate_spread_, self.rate_memory_ = model.rates
+        self.rate_spread_ = model.rates.spread
         self._model, self._seed, self._running = model, seed, None
         return self
 
