@@ -2,6 +2,7 @@
 
 import reprlib
 from collections.abc import Iterable, Mapping, Set, Sized
+from numbers import Number
 
 import numpy as np
 import pandas as pd
@@ -196,17 +197,10 @@ def _check_labels(labels, name):
     try:
         sorted(set(labels))
     except TypeError as error:
-        i = next((i for i, label in enumerate(labels) if not _sorts(label, labels[0])), 0)
+        kinds = [(isinstance(label, str), isinstance(label, Number)) for label in labels]
+        i = next((i for i, kind in enumerate(kinds) if kind != kinds[0]), 0)
         raise ValueError(
             f"{name}[{i}] is {labels[i]!r}, {name}[0] is {labels[0]!r}: labels must be of one type "
             "that can be sorted, such as text."
         ) from error
     return labels
-
-
-def _sorts(a, b):
-    try:
-        a < b  # noqa: B015
-    except TypeError:
-        return False
-    return True
