@@ -179,19 +179,16 @@ def make_gait(
         recorded.append(record(generator, walk, n_frames, noise))
     gait = _describe_takes(recorded, frame_rate) if takes else _describe_cycles(recorded)
     people = np.arange(n_people).repeat(len(gait.data) // n_people)
-    gait.update(_describe_groups(people, timing))
-    gait.update(feature_names=list(_CURVES), units=list(_UNITS), frame_rate=float(frame_rate))
-    return gait
-
-
-def _describe_groups(people, timing):
-    """The person and group of each trial, and the typical timing of each group."""
     moments = np.linspace(0, 1, _N_MOMENTS)
-    return {
-        "person": np.array([f"person{i}" for i in people]),
-        "group": np.array([_GROUPS[i % 2] for i in people]),
-        "group_times": np.stack([_shift_times(moments, t) for t in (0.0, timing)]),
-    }
+    gait.update(
+        person=np.array([f"person{i}" for i in people]),
+        group=np.array([_GROUPS[i % 2] for i in people]),
+        group_times=np.stack([_shift_times(moments, t) for t in (0.0, timing)]),
+        feature_names=list(_CURVES),
+        units=list(_UNITS),
+        frame_rate=float(frame_rate),
+    )
+    return gait
 
 
 # -- the walk of a person: curves, cycle after cycle, and their pace --------------------

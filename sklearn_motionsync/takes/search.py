@@ -310,12 +310,6 @@ class Hit(NamedTuple):
     proposed: float
 
 
-def _best_first(scores):
-    """Indices of scores, the best first; equally good ones in their order."""
-    dissimilarity = -np.log(np.maximum(scores, _NO_SCORE))
-    return np.argsort(whole(dissimilarity / _EQUAL), kind="stable")
-
-
 def search_windows(take, windows, dissimilarity, shortest, longest, lowest):
     """A `Hit` of each of windows (n, 2) that overlaps no better one, in order of time.
 
@@ -324,8 +318,10 @@ def search_windows(take, windows, dissimilarity, shortest, longest, lowest):
     threshold is, so that this selects among hits and changes none.
     """
     scores = np.exp(-dissimilarity(take, windows))
+    # Equally good ones in their order.
+    levels = whole(-np.log(np.maximum(scores, _NO_SCORE)) / _EQUAL)
     refined = []
-    for k in _best_first(scores):
+    for k in np.argsort(levels, kind="stable"):
         if scores[k] < lowest:
             continue
         window, score = windows[k], scores[k]
