@@ -61,9 +61,10 @@ class ASpace(LongWorkMixin, ClassNamePrefixFeaturesOutMixin, TrialTransformerMix
         Their shares of the whole variance (0 where all poses are the same).
     n_components_ : int
         ``b``.
+    residual_variance_ : float
+        ``eps_b`` of Eq. 4: the variance left out, the sum of the other eigenvalues.
     left_out_variance_ : ndarray, shape (n_features,)
-        The variance left out of each feature; the sum is ``eps_b`` of Eq. 4, that of the other
-        eigenvalues.
+        The variance left out of each feature; the sum is ``eps_b``.
     missing_ : ndarray, shape (n_features,)
         The share of the training poses in which a feature was missing (NaN).
     n_features_in_ : int
@@ -177,6 +178,7 @@ class ASpace(LongWorkMixin, ClassNamePrefixFeaturesOutMixin, TrialTransformerMix
         self.mean_ = mean
         self.explained_variance_ = variance[:b]
         self.explained_variance_ratio_ = variance[:b] / (variance.sum() or 1.0)
+        self.residual_variance_ = float(variance[b:].sum())
         self.left_out_variance_ = variance[b:] @ np.square(components[b:])
         self.n_components_ = b
         self.missing_ = missing

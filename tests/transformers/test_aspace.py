@@ -36,15 +36,16 @@ def test_smallest_b_that_reaches_the_share(poses, share):
     expected = next(b for b in range(1, 6) if shares[b - 1] >= share - 1e-12)
     aspace = ASpace(share).fit(poses)
     assert aspace.n_components_ == expected
-    left_out, kept = aspace.left_out_variance_.sum(), aspace.explained_variance_.sum()
-    np.testing.assert_allclose(left_out, values[expected:].sum(), atol=1e-10)
-    np.testing.assert_allclose(kept + left_out, values.sum())
+    np.testing.assert_allclose(aspace.residual_variance_, values[expected:].sum(), atol=1e-10)
+    kept = aspace.explained_variance_.sum()
+    np.testing.assert_allclose(kept + aspace.residual_variance_, values.sum())
 
 
-def test_left_out_variance_is_the_reconstruction_error(poses):
+def test_residual_variance_is_the_reconstruction_error(poses):
     aspace = ASpace(2).fit(poses)
     back = aspace.inverse_transform(aspace.transform(poses))
     error = np.concatenate(back) - np.concatenate(poses)
+    np.testing.assert_allclose(np.square(error).sum() / (len(error) - 1), aspace.residual_variance_)
     by_parameter = np.square(error).sum(axis=0) / (len(error) - 1)
     np.testing.assert_allclose(aspace.left_out_variance_, by_parameter)
 
