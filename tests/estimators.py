@@ -141,5 +141,5 @@ def outputs(estimator, X):
     elif hasattr(estimator, "score"):
         results += [np.array(estimator.score(X))]
     if hasattr(estimator, "segment"):
-        results += [*estimator.segment(X)[0], *estimator.phases(X)]
+        results += estimator.segment(X)[0]
     return results

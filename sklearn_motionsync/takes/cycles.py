@@ -26,7 +26,7 @@ from ..inputs.findings import warn_of_findings
 from ..inputs.resampling import as_frame_rates
 from ..inputs.types import TrialsLike, ValuesLike
 from ..inputs.validation import check_input, names_of_input
-from ..matching.counting import ROUNDING, first_largest, whole
+from ..matching.counting import ROUNDING, first_largest
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import FRAME_RATE, validated
 from .cutting import as_takes, cut_takes
@@ -342,29 +342,6 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
             )
         return cut_takes(collection, takes, table)
 
-    def phases(self, X: TrialsLike) -> list[np.ndarray]:
-        """The phase of every frame.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or one take (n_frames, n_features)
-            Takes.
-
-        Returns
-        -------
-        list of ndarray (n_frames_i,)
-            In cycles: whole numbers where a cycle begins, from 0 to 1 at the first frame of the
-            first stretch; the next stretch goes on with the next number. NaN outside the stretches,
-            and for takes that are skipped.
-        """
-        check_is_fitted(self, "pattern_")
-        collection, takes = check_takes(self, X, reset=False)
-        out = [np.full(len(take), np.nan) for take in takes]
-        for i, _, stretch, sampled, phases in self._phases(collection, takes):
-            inside = np.arange(stretch.start, stretch.stop)
-            out[i][inside] = np.interp(inside, sampled.times, phases)
-        return out
-
     def report(self, X: TrialsLike) -> pd.DataFrame:
         """Whether takes are cyclic, and where, by their self-correlation; no fit is needed.
 
@@ -438,14 +415,11 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         align = match_phases if self.refine else constant_phases
         strikes = strikes_of(self, collection) if self.start_ in STRIKES else None
         for i in self._select_cyclic(takes, repeats):
-            first = 0
             for number, stretch in enumerate(repeats[i].stretches):
                 sampled = SampledStretch(features[i], stretch)
                 phases = align(self.pattern_, sampled)
                 if strikes is not None:
                     phases = move_to_events(sampled.times, phases, strikes[i])
-                phases = np.maximum(phases + first - whole(phases[0], "down"), first)
-                first = whole(phases[-1], "up")
                 yield i, number, stretch, sampled, phases
 
     def _learn_phases(self, sampled, progress):

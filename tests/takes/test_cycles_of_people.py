@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from sklearn.model_selection import GroupKFold
 from sklearn_motionsync.takes import CycleSegmenter
+from sklearn_motionsync.takes.cycles import correlate_takes
+from sklearn_motionsync.takes.stretches import SampledStretch, match_phases
 
 
 @pytest.fixture(scope="module")
@@ -58,13 +60,18 @@ def test_walks_of_too_few_cycles_are_rejected(n_cycles, read):
 
 def phases_of_others(bunch):
     """Phases of every take, by a segmenter that knows the takes of other people only."""
-    out = [None] * len(bunch.data)
+    out = [np.full(len(x), np.nan) for x in bunch.data]
     for train, test in GroupKFold(2).split(bunch.data, groups=bunch.actor):
         # Which foot is farther ahead depends on who is left out.
         segmenter = CycleSegmenter(bunch.skeleton, start="right")
         segmenter.fit([bunch.data[i] for i in train])
-        for i, phases in zip(test, segmenter.phases([bunch.data[i] for i in test]), strict=True):
-            out[i] = phases
+        takes = [bunch.data[i] for i in test]
+        for i, x, repeats in zip(test, *correlate_takes(segmenter, takes, takes), strict=True):
+            for stretch in repeats.stretches:
+                sampled = SampledStretch(x, stretch)
+                phases = match_phases(segmenter.pattern_, sampled)
+                inside = np.arange(stretch.start, stretch.stop)
+                out[i][inside] = np.interp(inside, sampled.times, phases)
     return out
 
 

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from sklearn_motionsync.takes import CycleSegmenter
 from sklearn_motionsync.takes.stretches import (
     PHASES,
     average_cycle,
@@ -102,12 +101,3 @@ def test_no_part_is_empty_where_a_take_begins_and_ends_with_a_whole_phase():
     take = SimpleNamespace(times=np.arange(65.0), values=values, begins=False, ends=False)
     rows = list(locate_cycles(take, phases, PATTERN, incomplete=True))
     assert [row[:3] for row in rows] == [(0, 33, True), (32, 65, True)]
-
-
-def test_phases_begin_within_the_first_cycle():
-    angles = 2 * np.pi * np.arange(400)[:, np.newaxis] / 80
-    take = np.sin(angles + np.arange(3)) + 0.5 * np.cos(2 * angles)
-    segmenter = CycleSegmenter(start=0).fit(take)
-    first = [segmenter.phases(take[k:])[0][0] for k in range(0, 80, 16)]
-    assert all(0 <= phase < 1 for phase in first)
-    assert np.ptp(first) > 0.5

@@ -48,14 +48,6 @@ def test_several_stretches_are_numbered_and_counted_on():
     ends = table.groupby("stretch").agg({"start": "min", "stop": "max"})
     np.testing.assert_allclose(ends, [[150, 390], [540, 840]], rtol=0, atol=8)
     assert [len(x) for x in cycles] == (table["stop"] - table["start"]).tolist()
-    (phases,) = segmenter.phases([x])
-    numbers = np.round(phases[whole["start"]])
-    np.testing.assert_allclose(phases[whole["start"]], numbers, atol=0.03)
-    assert (np.diff(numbers) > 0).all()
-    outside = np.ones(len(x), dtype=bool)
-    for start, stop in places(x):
-        outside[start:stop] = False
-    np.testing.assert_array_equal(np.isnan(phases), outside)
     display = CycleDisplay.from_estimator(segmenter, [x])
     assert len(display.stretches_) == 2
     assert repr(display).startswith(f"CycleDisplay({len(x)} frames, 2 stretches, period")
