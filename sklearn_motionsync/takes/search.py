@@ -23,7 +23,6 @@ from ..inputs.types import Labels, TrialLike, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_input
 from ..inputs.wording import counted, within
 from ..matching.counting import first_largest, whole
-from ..matching.matcher import Features
 from ..matching.trellis import Trellis
 from ..matching.warps import at_times, even_slices
 from ..model.action_model import ActionModel
@@ -171,7 +170,7 @@ def find_trials(
     synchronizer, takes, codes = _reach(pattern, searched, groups)
     _check_lengths(checked if searched is X else searched, takes, checked.called)
     dissimilarity = WindowDissimilarity(synchronizer, codes)
-    propose = Proposer.of(synchronizer, *_limits_of_windows(synchronizer.lengths_))
+    propose = Proposer(synchronizer, *_limits_of_windows(synchronizer.lengths_))
     with Progress(checker, verbose) as progress:
         hits = _search_takes(takes, propose, dissimilarity, threshold, coverage, progress)
     rows = []
@@ -433,45 +432,24 @@ _SMOOTHNESS, _MAX_RATE = 0.003, 3
 _PROPOSAL_BATCH = 64
 
 
-class Proposer(NamedTuple):
-    """Proposes windows of takes that may hold a pattern.
+class Proposer:
+    """Proposes windows of takes, of so many frames, that may hold the pattern of a synchronizer."""
 
-    Attributes
-    ----------
-    features : Features
-        What is compared of portions, of which it is made on the clock of the pattern.
-    base : ndarray, shape (1, P, n_compared)
-        Features of the pattern.
-    trellis : Trellis
-        With free ends.
-    lengths : ndarray of int
-        Typical number of frames at each time scale.
-    shortest, longest : int
-        Limits of the numbers of frames of windows.
-    """
-
-    features: Features
-    base: np.ndarray
-    trellis: Trellis
-    lengths: np.ndarray
-    shortest: int
-    longest: int
-
-    @classmethod
-    def of(cls, synchronizer, shortest, longest):
-        """The proposer of the pattern of a synchronizer, for windows of so many frames."""
+    def __init__(self, synchronizer, shortest, longest):
         n_frames = min(synchronizer.n_frames_, _CLOCK_FRAMES)
         features = synchronizer.features_
         pattern = synchronizer.pattern_.astype(np.float64)
-        base = features(features.positions([pattern], n_frames))
-        mu = _SMOOTHNESS * float(np.square(base).sum()) / n_frames
-        trellis = Trellis.on_clock(
+        self.base = features(features.positions([pattern], n_frames))
+        mu = _SMOOTHNESS * float(np.square(self.base).sum()) / n_frames
+        self.trellis = Trellis.on_clock(
             features.cost, n_frames, mu, max_offset=_SHARE, max_rate=_MAX_RATE, free=True
         )
         # The filter of velocities is as wide in a portion as in the pattern.
-        share = (n_frames - 1) / (n_frames - 1 + 2 * trellis.width)
-        features = features._replace(velocity_smoothing=share * features.velocity_smoothing)
-        return cls(features, base, trellis, scales(shortest, longest), shortest, longest)
+        share = (n_frames - 1) / (n_frames - 1 + 2 * self.trellis.width)
+        self.features = features._replace(velocity_smoothing=share * features.velocity_smoothing)
+        # Typical numbers of frames at the time scales.
+        self.lengths = scales(shortest, longest)
+        self.shortest, self.longest = shortest, longest
 
     def __call__(self, take):
         """Distinct windows of a take (n_frames, n_features): (n_windows, 2) of start and stop."""
