@@ -268,17 +268,13 @@ class BodyPanel:
         for side, lines in self.bones.items():
             lines.set_segments(_segments(bodies, self._bones[side]))
         self.shadows.set_segments(_segments(shadows, self._all))
-        dots = [self._dots_of(body) for body in bodies]
+        skeleton, dots = self._skeleton, []
+        for body in bodies:
+            if skeleton is None or not skeleton.bones:
+                dots.append(body if skeleton is None else body[: len(skeleton.joints)])
+            elif "head" in skeleton.landmarks:
+                dots.append(landmark_track(body[np.newaxis], skeleton, "head"))
         self.dots.set_data(np.concatenate(dots).T if dots else ([], []))
-
-    def _dots_of(self, body):
-        """The places of the dots of a body: its head, or all joints if there are no bones."""
-        skeleton = self._skeleton
-        if skeleton is None or not skeleton.bones:
-            return body if skeleton is None else body[: len(skeleton.joints)]
-        if "head" not in skeleton.landmarks:
-            return body[:0]
-        return landmark_track(body[np.newaxis], skeleton, "head")
 
 
 def _bone_lines(axis, color, width, alpha, zorder):

@@ -75,13 +75,6 @@ class GroupCurves(NamedTuple):
     color: str
     line: str
 
-    def draw_band(self, axis, clock, i):
-        """Draw the band of panel i in the pale colour of the group."""
-        bounds = self.mean[:, i] - self.half[:, i], self.mean[:, i] + self.half[:, i]
-        for bound in bounds:
-            axis.plot(clock, bound, color=self.color, linewidth=0.5)
-        return axis.fill_between(clock, *bounds, color=self.color, alpha=0.18, linewidth=0)
-
 
 class GroupDisplay(Display):
     """Means of groups with bands, the timing of their people, and where they differ.
@@ -279,11 +272,16 @@ class GroupDisplay(Display):
                     behind, style = group.trials[:, :, i], {"linewidths": 0.7, "alpha": 0.5}
                     lines = curves(axis, [clock] * len(behind), behind, colors=group.color, **style)
                     self.trials_[-1].append(lines)
-            self.bands_.append([group.draw_band(axis, clock, i) for group in self.groups])
+            self.bands_.append([])
             self.means_.append([])
             for group in self.groups:
-                style = {"color": group.color, "linestyle": group.line, "linewidth": 2}
-                self.means_[-1].append(front_line(axis, clock, group.mean[:, i], **style))
+                color, mean, half = group.color, group.mean[:, i], group.half[:, i]
+                for bound in (mean - half, mean + half):
+                    axis.plot(clock, bound, color=color, linewidth=0.5)
+                style = {"color": color, "alpha": 0.18, "linewidth": 0}
+                self.bands_[-1].append(axis.fill_between(clock, mean - half, mean + half, **style))
+                style = {"color": color, "linestyle": group.line, "linewidth": 2}
+                self.means_[-1].append(front_line(axis, clock, mean, **style))
         timing.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         ylabels = [*self.ylabels, offset_label(self.axis.unit)]
         self._label_axes(self.axes_, ylabels, self.axis.label, ends=clock)

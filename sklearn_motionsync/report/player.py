@@ -174,32 +174,17 @@ def _marks(shares, names, times):
     return out
 
 
-def _bodies_of(reached, X, params):
-    """The joint positions that reach the first step with a skeleton, and that; else X and None.
-
-    Parameters
-    ----------
-    reached : Routed
-    X : trials, as the first step takes them
-    params : dict
-        As for `transform_through`.
-    """
-    *steps, synchronizer = reached.steps
-    for k, step in enumerate(steps):
-        for transformer in union_transformers(step):
-            if isinstance(transformer, PositionsTransformer):
-                earlier = make_pipeline(*steps[:k]) if k else None
-                # Later ones take the other params.
-                also = [*(later.transform for later in steps[k:]), synchronizer.match]
-                X = transform_through(earlier, X, params, "write_report", also=also)
-                return X, transformer.skeleton
-    return X, None
-
-
 def add_player_of(page, trials, X, params, skeleton):
     """Add the player of a report, where there are bodies."""
-    if skeleton is None:
-        X, skeleton = _bodies_of(trials.aligned.reached, X, params)
+    *steps, synchronizer = trials.aligned.reached.steps
+    for k, step in enumerate(steps if skeleton is None else ()):
+        taking = [t for t in union_transformers(step) if isinstance(t, PositionsTransformer)]
+        if taking:
+            skeleton, earlier = taking[0].skeleton, make_pipeline(*steps[:k]) if k else None
+            # Later ones take the other params.
+            also = [*(later.transform for later in steps[k:]), synchronizer.match]
+            X = transform_through(earlier, X, params, "write_report", also=also)
+            break
     if skeleton is None:
         return
     n, pattern = len(trials.names), trials.pattern

@@ -170,7 +170,7 @@ def find_trials(
     synchronizer, takes, codes = _reach(pattern, searched, groups)
     _check_lengths(checked if searched is X else searched, takes, checked.called)
     dissimilarity = WindowDissimilarity(synchronizer, codes)
-    propose = Proposer(synchronizer, *_limits_of_windows(synchronizer.lengths_))
+    propose = Proposer(synchronizer)
     with Progress(checker, verbose) as progress:
         hits = _search_takes(takes, propose, dissimilarity, threshold, coverage, progress)
     rows = []
@@ -412,13 +412,6 @@ def _training_groups(pattern, reached, groups):
     return None
 
 
-def _limits_of_windows(lengths):
-    """The smallest and the largest number of frames of a window, by the training trials."""
-    margin = _MARGIN if len(lengths) > 1 else _MARGIN_OF_ONE
-    shortest = max(_SHORTEST, whole(lengths.min() / margin, "down"))
-    return shortest, whole(lengths.max() * margin, "up")
-
-
 # -- proposals: windows of a take that may hold the action, by matching with free ends ------
 
 # Frames of the clock of proposals, which need only be rough.
@@ -433,9 +426,9 @@ _PROPOSAL_BATCH = 64
 
 
 class Proposer:
-    """Proposes windows of takes, of so many frames, that may hold the pattern of a synchronizer."""
+    """Proposes windows of takes that may hold the pattern of a synchronizer."""
 
-    def __init__(self, synchronizer, shortest, longest):
+    def __init__(self, synchronizer):
         n_frames = min(synchronizer.n_frames_, _CLOCK_FRAMES)
         features = synchronizer.features_
         pattern = synchronizer.pattern_.astype(np.float64)
@@ -447,9 +440,12 @@ class Proposer:
         # The filter of velocities is as wide in a portion as in the pattern.
         share = (n_frames - 1) / (n_frames - 1 + 2 * self.trellis.width)
         self.features = features._replace(velocity_smoothing=share * features.velocity_smoothing)
+        lengths = synchronizer.lengths_
+        margin = _MARGIN if len(lengths) > 1 else _MARGIN_OF_ONE
+        self.shortest = max(_SHORTEST, whole(lengths.min() / margin, "down"))
+        self.longest = whole(lengths.max() * margin, "up")
         # Typical numbers of frames at the time scales.
-        self.lengths = scales(shortest, longest)
-        self.shortest, self.longest = shortest, longest
+        self.lengths = scales(self.shortest, self.longest)
 
     def __call__(self, take):
         """Distinct windows of a take (n_frames, n_features): (n_windows, 2) of start and stop."""

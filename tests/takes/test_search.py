@@ -193,7 +193,7 @@ def test_windows_of_twice_the_dissimilarity_of_the_threshold_are_not_refined():
 
 def test_proposer_has_the_smoothness_and_the_filter_of_the_method():
     sync = DenseSynchronizer(40).fit(TRAINING)
-    learnt = Proposer(sync, 30, 80)
+    learnt = Proposer(sync)
     size = np.square(learnt.base).sum(axis=2).mean()
     np.testing.assert_allclose(learnt.trellis.mu, 0.003 * size)
     # The Gaussian has as many frames in a portion, which is longer by the free ends.
@@ -207,9 +207,9 @@ def test_proposer_has_the_smoothness_and_the_filter_of_the_method():
 def test_proposals_are_the_best_paths_of_their_portions():
     sync = DenseSynchronizer(4, pattern=0).fit([movement(4)])
     table, mu, reach = step_table("velocity", 2), 0.1, 2
-    proposer = Proposer(sync, 4, 9)
+    proposer = Proposer(sync)
     proposer.trellis = Trellis(table, mu, reach, free=True)
-    proposer.lengths, proposer.shortest = np.array([4]), 0
+    proposer.lengths, proposer.shortest, proposer.longest = np.array([4]), 0, 9
     costs = dict(zip(table.steps, zip(*table[1:4], strict=True), strict=True))
     paths = list(oracle.all_free_paths(4, sorted(costs), 1, reach))
     take, expected = np.random.default_rng(0).standard_normal((12, 3)), set()
