@@ -56,7 +56,7 @@ def least_squares(before: TrialsLike, after: TrialsLike) -> float:
     0.25
     """
     (x, tolerance), (y, tolerance_after) = _check_pair(before, after)
-    old, new = (_squared_norms(_from_others(z)) for z in (x, y))
+    old, new = (_distances_from_others(z) for z in (x, y))
     counts = old > x.shape[2] * tolerance**2
     if not counts.any():
         if (new <= y.shape[2] * tolerance_after**2).all():
@@ -219,13 +219,8 @@ def _on_clock(values, what):
     return as_numbers(values, what)
 
 
-def _squared_norms(z):
-    """``int |z_i|^2 dt`` over [0, 1] of every sequence, by the trapezoidal rule."""
-    return np.trapezoid(np.square(z).sum(axis=2), dx=1 / (z.shape[1] - 1), axis=1)
-
-
-def _from_others(z):
-    """Differences of every sequence from the mean of the others.
+def _distances_from_others(z):
+    """``int |z_i - mean_{j != i} z_j|^2 dt`` over [0, 1] of every sequence, trapezoidal rule.
 
     What is hidden differs by 0, and the rest by as much more as gives the mean square of the seen.
     """
@@ -233,13 +228,15 @@ def _from_others(z):
     if not hidden.any():
         # Relative to the first one, so that identical sequences differ by exactly 0.
         z = z - z[0]
-        return (z - z.mean(axis=0)) * len(z) / (len(z) - 1)
-    n_others = (~hidden).sum(axis=0) - 1
-    differences = (
-        np.where(hidden, 0, z - nanmean(z, axis=0)) * (n_others + 1) / np.maximum(n_others, 1)
-    )
-    compared = (~hidden & (n_others > 0)).mean(axis=(1, 2), keepdims=True)
-    return differences / np.sqrt(np.where(compared > 0, compared, 1))
+        differences = (z - z.mean(axis=0)) * len(z) / (len(z) - 1)
+    else:
+        n_others = (~hidden).sum(axis=0) - 1
+        differences = (
+            np.where(hidden, 0, z - nanmean(z, axis=0)) * (n_others + 1) / np.maximum(n_others, 1)
+        )
+        compared = (~hidden & (n_others > 0)).mean(axis=(1, 2), keepdims=True)
+        differences = differences / np.sqrt(np.where(compared > 0, compared, 1))
+    return np.trapezoid(np.square(differences).sum(axis=2), dx=1 / (z.shape[1] - 1), axis=1)
 
 
 def _variance(z):

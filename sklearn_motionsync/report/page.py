@@ -117,9 +117,14 @@ def table_of(table, caption, by_row=()):
         column = table.iloc[:, k]
         kind = ' class="n"' if column.dtype.kind in "if" else ""
         heads.append(f'<th scope="col"{kind}>{escape(str(name))}</th>')
-        columns.append(
-            [f"<td{kind}>{escape(text)}</td>" for text in _texts(column, name in by_row)]
-        )
+        if column.dtype.kind == "b":
+            texts = ["yes" if value else "no" for value in column]
+        elif column.dtype.kind == "f":
+            largest = None if name in by_row else column.abs().max()
+            texts = [number(value, largest) for value in column]
+        else:
+            texts = [str(value) for value in column]
+        columns.append([f"<td{kind}>{escape(text)}</td>" for text in texts])
     rows = ["<tr>" + "".join(cells) + "</tr>" for cells in zip(*columns, strict=True)]
     return (
         f"<figure>\n<figcaption>{escape(caption)}</figcaption>\n"
@@ -127,15 +132,6 @@ def table_of(table, caption, by_row=()):
         f"<thead><tr>{''.join(heads)}</tr></thead>\n<tbody>\n" + "\n".join(rows) + "\n"
         "</tbody>\n</table>\n</div>\n</figure>"
     )
-
-
-def _texts(column, by_row):
-    if column.dtype.kind == "b":
-        return ["yes" if value else "no" for value in column]
-    if column.dtype.kind != "f":
-        return [str(value) for value in column]
-    largest = None if by_row else column.abs().max()
-    return [number(value, largest) for value in column]
 
 
 def number(value, largest=None):

@@ -443,7 +443,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         cycles = {
             name: average_cycle(
                 [
-                    stretch.sample(of_all[k][:, np.newaxis])
+                    stretch.sample(of_all[k][stretch.inside, np.newaxis])
                     for stretch, k in zip(sampled, takes_of, strict=True)
                 ],
                 phases,

@@ -345,22 +345,19 @@ class SampledStretch:
 
     def __init__(self, features, stretch):
         start, period = stretch.start, stretch.correlation.period
-        self._inside = slice(start, stretch.stop)
-        inside = features[self._inside]
+        self.inside = slice(start, stretch.stop)
+        inside = features[self.inside]
         self.begins, self.ends = start > 0, stretch.stop < len(features)
         last = len(inside) - 1
         n_samples = max(whole(last / period * PHASES), 1) + 1
         self.times = np.linspace(start, start + last, n_samples)
         self.mean_phases = (self.times - start) / period
-        poses = self._sample(smooth(inside[np.newaxis], period / PHASES / 2)[0])
+        poses = self.sample(smooth(inside[np.newaxis], period / PHASES / 2)[0])
         velocities = smooth(poses[np.newaxis], _SPEED_WIDTH, 1)[0]
         self.values = np.concatenate([_standardise(poses), _standardise(velocities)], axis=1)
 
     def sample(self, values):
-        """Values of the frames of the take, (n_frames, n), at the samples."""
-        return self._sample(values[self._inside])
-
-    def _sample(self, values):
+        """Values of the frames of the stretch, (n_frames, n), at the samples."""
         return normalise([np.ascontiguousarray(values, dtype=np.float64)], len(self.times))[0]
 
 
