@@ -1,6 +1,6 @@
 """How many patients `compare_to_norm` finds, and how many people of the norm it calls different.
 
-    python benchmarks/norm.py DATA_FOLDER [made] [people]
+    python benchmarks/norm.py DATA_FOLDER [made] [people] [children]
 
 *Made*: 24 norms of `make_gait`, of 18 people with 53 strides, or 10 with 30. Twelve new people of
 each kind, with one stride or three: normal; late, toe-off 3 or 5 % of the cycle later; weak, knee
@@ -10,13 +10,19 @@ at a level of 10 %; the largest and the mean number of rows of departures, of th
 *People*: exercises of UI-PRMD. The norm are the right repetitions of nine people; new is the tenth,
 by one, five or ten repetitions drawn at random: done right, done wrong, and the right ones made 5
 and 10 % late. Those of people who use the other side are mirrored. Compared are the dimensions of
-an aSpace of limb directions. Per cent that differ at a level of 10 %, by exercise. Prints Markdown.
+an aSpace of limb directions. Per cent that differ at a level of 10 %, by exercise.
+
+*Children*: hip and knee of 39 children (Ramsay and Silverman, from fdatools), each left out in turn:
+as they are, 5 % late, with 10 and 15 degrees less knee flexion in swing, and with 10 degrees more
+hip flexion. Per cent that differ at a level of 10 %, and those whose first row is of timing. Prints
+Markdown.
 """
 
 import warnings
 
 import numpy as np
 from exercises import read_exercises
+from forces import read_children
 from harness import at_frames, command_line, print_head, print_row, run_tables
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
@@ -110,6 +116,29 @@ def made(folder):
             print_row(kind, [f"{x:.1f}" for x in (differ, most, mean)])
 
 
+def child(angles, i):
+    """Whether each kind differs, and whether its first row is of timing: (n_kinds, 2)."""
+    warnings.simplefilter("ignore")
+    x, norm = angles[i], list(np.delete(angles, i, axis=0))
+    swing = np.exp(-0.5 * ((np.linspace(0, 1, P) - 0.72) / 0.12) ** 2)[:, np.newaxis]
+    new = [x, made_late(x, 0.05), x - [0, 10] * swing, x - [0, 15] * swing, x + [10, 0]]
+    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(norm)
+    y = ["norm"] * len(norm) + ["new"] * len(new)
+    found = compare_to_norm(pipe, norm + new, y, norm="norm", level=0.1)
+    first = found.departures.groupby("subject")["what"].first().reindex(found.verdicts.index)
+    return np.column_stack([found.verdicts["differs"], first == "timing"])
+
+
+def children(folder):
+    angles = read_children()
+    shares = np.mean(Parallel(2)(delayed(child)(angles, i) for i in range(len(angles))), axis=0)
+    kinds = "as they are", "5 % late", "knee - 10 degrees", "knee - 15 degrees", "hip + 10 degrees"
+    print_head("39 children", ["differ, %", "timing first, %"])
+    for kind, row in zip(kinds, shares, strict=True):
+        print_row(kind, [f"{100 * x:.0f}" for x in row])
+
+
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    run_tables({"made": made, "people": people}, command_line(__doc__))
+    tables = {"made": made, "people": people, "children": children}
+    run_tables(tables, command_line(__doc__))

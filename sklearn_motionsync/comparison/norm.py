@@ -12,8 +12,8 @@ from sklearn.base import BaseEstimator
 
 from ..inputs.types import Features, Labels, TrialsLike, Unit
 from ..inputs.wording import counted
-from ..matching.counting import first_largest, runs_of
-from ..model.acceptance import LogMoments
+from ..matching.counting import first_largest, runs_of, whole
+from ..model.acceptance import LEAST, LogMoments
 from ..model.variation import predictive_variance
 from ..synchronizers.match import UNITS, Match
 from ..utils.groups import encode_groups, refuse_classes_as_people
@@ -22,8 +22,14 @@ from .study import check_level
 
 # The variance at a frame is shrunk to the mean over the frames, which weighs as many people.
 _SHRINKAGE = 20
-# Prior variance of the logarithm of the largest deviation, as of `simultaneous_factor`.
-_PRIOR_VARIANCE = 0.1
+# Widths of bumps, as standard deviations and shares of the clock: of signals, and of the offset;
+# and the frames on which they are sought, at most.
+_WIDTHS, _MOST_FRAMES = (0.1, 0.2), 34
+# The share of independent frames in the correlations between all frames and signals.
+_INDEPENDENT = 0.5
+# Prior variances of the logarithm of a measure, as of `simultaneous_factor`, and of the largest
+# of four standardised ones.
+_PRIOR_VARIANCE, _PRIOR_OF_LARGEST = 0.1, 0.7
 # Departures of one feature are one if between them the deviation stays above this share of the
 # limit.
 _BETWEEN = 0.5
@@ -45,10 +51,11 @@ class NormComparison:
         One row a subject: ``group``, ``n_trials``; ``p``, that a new person of the norm deviates as
         much, in shape or in timing; ``p_shape`` and ``p_timing`` alone; and ``differs``.
     departures : DataFrame
-        Where: one row a stretch, of each subject the largest first, five at most. ``subject``;
-        ``what``, "shape" or "timing"; ``feature``; ``start``, ``end`` and ``peak``, in the unit of
-        time; ``direction``; ``size``, the difference from the mean of the norm at the peak, in its
-        ``unit``; ``deviation``, the same in standard deviations of people.
+        Where: one row a stretch or a bump, of each subject that differs the clearest first, five at
+        most. ``subject``; ``what``, "shape" or "timing"; ``feature``; ``start``, ``end`` and
+        ``peak``, in the unit of time; ``direction``; ``size``, the difference from the mean of the
+        norm at the peak, in its ``unit``, or the height of a bump beside what the rest of the curve
+        lets expect; ``deviation``, the same in standard deviations of people.
     profile : DataFrame
         One row a subject and feature: root mean square over the frames of the difference from the
         mean of the norm. ``aligned``; ``linear``, after linear normalisation; ``norm``, the median
@@ -66,7 +73,9 @@ class NormComparison:
     mean, std : ndarray, shape (P, n_signals + 1)
         Of the norm: mean, and standard deviation predicted for a new person.
     limits : ndarray, shape (n_subjects, n_signals + 1)
-        The largest deviation that is no departure, in these standard deviations.
+        The largest deviation of a frame that is no departure, in these standard deviations.
+    limits_of_bumps : ndarray, shape (n_subjects, 2)
+        The largest gain of a bump that is no departure, of the signals and of the offset.
     curves : ndarray, shape (n_subjects, P, n_signals + 1)
         Mean of the trials of each subject, in the order of ``verdicts``.
 
@@ -96,6 +105,7 @@ class NormComparison:
     mean: np.ndarray
     std: np.ndarray
     limits: np.ndarray
+    limits_of_bumps: np.ndarray
     curves: np.ndarray
 
     def __repr__(self):
@@ -193,14 +203,19 @@ def compare_to_norm(
 
     Notes
     -----
-    1. Deviations are in standard deviations predicted for a new person. The variance at a frame is
-       shrunk to the mean over the frames, which weighs as much as 20 people.
-    2. The largest deviation, over all frames and signals, is that of shape; over all frames of the
-       offset, that of timing.
+    1. Deviations z are in standard deviations predicted for a new person. The variance at a frame
+       is shrunk to the mean over the frames, which weighs as much as 20 people.
+    2. Four measures are taken of a subject, two of the shape and two of the timing. The largest
+       ``|z|`` over all frames and signals, and over all frames of the offset, sees what is far from
+       all people. The largest gain of a bump sees what is unusual for *this* curve: with the
+       covariance C of z over all frames and signals, half of which is that of independent frames,
+       and of the offset with them, a bump b has the gain ``b' C^-1 z / sqrt(b' C^-1 b)`` and the
+       height ``b' C^-1 z / (b' C^-1 b)``. A bump changes one signal, as a Gaussian with a standard
+       deviation of a tenth of the clock, or the offset with a fifth of it.
     3. Every person of the norm is left out in turn and compared with the others, in as many trials
-       as the subject has. The logarithms of their largest deviations predict that of a new
-       person by Student's t. So p of shape and timing have their level, whatever the number of
-       signals. p is twice the smaller one.
+       as the subject has. So each measure gets its mean and scale, in the logarithm, and the
+       largest of the four standardised ones its own: they predict that of a new person by Student's
+       t. So p has its level, whatever the number of signals.
 
     Examples
     --------
@@ -224,16 +239,19 @@ def compare_to_norm(
     timing = aligned.offsets[:, :, np.newaxis]
     values = np.concatenate([aligned.curves, timing], axis=2).astype(np.float64, copy=False)
     of_norm = [values[trials] for trials in norm_trials]
-    mean, std = _of_norm(np.stack([x.mean(axis=0) for x in of_norm]))
+    people = _People(np.stack([x.mean(axis=0) for x in of_norm]))
     curves = np.stack([values[trials].mean(axis=0) for *_, trials in subjects])
-    z = (curves - mean) / std
     counts = [len(trials) for *_, trials in subjects]
-    p, limits = _chances(z, counts, of_norm, float(level))
-    verdicts = _verdicts(subjects, counts, p, level)
+    expected = {k: _Expected(of_norm, k) for k in set(counts)}
+    measures = people.measures(curves)
+    p = np.array([expected[k].chances(x) for k, x in zip(counts, measures, strict=True)])
+    # Of the shape, of its bumps, of the timing, and of its bumps.
+    limits = np.array([expected[k].limits(float(level)) for k in counts])
+    verdicts = _verdicts(subjects, counts, p, measures, limits)
     names, units = [*aligned.names, "offset"], [*aligned.units, UNITS[aligned.unit]]
     return NormComparison(
         verdicts=verdicts,
-        departures=_departures(z, curves - mean, limits, verdicts, names, units, aligned),
+        departures=_departures(people, curves, limits, verdicts, names, units, aligned.clock),
         profile=_profile(curves, of_norm, aligned, norm_trials, subjects, names, units),
         level=float(level),
         n_people=len(of_norm),
@@ -241,63 +259,168 @@ def compare_to_norm(
         clock=aligned.clock,
         features=names,
         units=units,
-        mean=mean,
-        std=std,
-        limits=limits,
+        mean=people.mean,
+        std=people.std,
+        limits=np.repeat(limits[:, ::2], [len(names) - 1, 1], axis=1),
+        limits_of_bumps=limits[:, 1::2],
         curves=curves,
     )
 
 
-def _of_norm(means):
-    """Mean, and standard deviation of a new person, of those of people (n_people, P, n)."""
-    variance = predictive_variance(means, np.arange(len(means)), _SHRINKAGE)
-    return means.mean(axis=0), np.sqrt(variance)
-
-
-def _chances(z, counts, of_norm, level):
-    """Probabilities (n, 2) of deviations in shape and in timing, and limits (n, n_features).
+class _People:
+    """The people of a norm, and how far curves are from theirs.
 
     Parameters
     ----------
-    z : ndarray, shape (n, P, n_features)
-        Deviations of the means of subjects.
-    counts : list of int, length n
-        Of their trials.
-    of_norm : list of ndarray, shape (n_trials_i, P, n_features)
-        The trials of each person of the norm.
-    level : float
+    means : ndarray, shape (n_people, P, n_features)
+        Of the trials of each person; the last feature is the offset.
+
+    Attributes
+    ----------
+    mean, std : ndarray, shape (P, n_features)
+        Of the people, and predicted for a new person.
+    bumps : list of _Bumps
+        Of the signals, and of the offset.
     """
-    p, limits = np.empty((len(z), 2)), np.empty((len(z), z.shape[2]))
-    for j, columns in enumerate((slice(0, -1), slice(-1, None))):
-        of_part = [x[:, :, columns] for x in of_norm]
-        of_new = {k: _largest_deviations(of_part, k) for k in set(counts)}
-        for i, k in enumerate(counts):
-            p[i, j] = of_new[k].tail(np.abs(z[i][:, columns]).max(), _PRIOR_VARIANCE)
-            limits[i, columns] = of_new[k].upper_limit(1 - level / 2, _PRIOR_VARIANCE)
-    return p, limits
+
+    def __init__(self, means):
+        variance = predictive_variance(means, np.arange(len(means)), _SHRINKAGE)
+        self.mean, self.std = means.mean(axis=0), np.sqrt(variance)
+        z = self.deviations(means)
+        # An offset may be unusual beside the curves; the shape is judged whatever the timing is.
+        self.bumps = [
+            _Bumps(z[..., :-1], self.std[:, :-1], _WIDTHS[0]),
+            _Bumps(z, self.std[:, -1:], _WIDTHS[1]),
+        ]
+
+    def deviations(self, curves):
+        """Curves (n, P, n_features) less the mean, in standard deviations."""
+        return (curves - self.mean) / self.std
+
+    def gains(self, z):
+        """The gains of bumps of the signals, and of the offset, and their heights."""
+        of_signals, of_offset = self.bumps
+        return of_signals.explain(z[..., :-1]), of_offset.explain(z)
+
+    def measures(self, curves):
+        """How far curves are: (n, 4), of shape, of its bumps, of timing, and of its bumps."""
+        z = self.deviations(curves)
+        (of_signals, _), (of_offset, _) = self.gains(z)
+        each = z[..., :-1], of_signals, z[..., -1:], of_offset
+        return np.column_stack([np.abs(x).max(axis=(1, 2)) for x in each])
 
 
-def _largest_deviations(of_people, k):
-    """The `LogMoments` of the largest deviation of a new person, of the mean of k trials.
+class _Bumps:
+    """Bumps of curves, and how much of a curve each explains beside what people vary.
+
+    Parameters
+    ----------
+    of_people : ndarray, shape (n_people, P, n_features)
+        Deviations of the people, in standard deviations.
+    std : ndarray, shape (P, n_columns)
+        Of the last features, in which bumps are sought.
+    width : float
+        The standard deviation of a bump, as a share of the clock.
+
+    Attributes
+    ----------
+    centres : list of int
+        In frames.
+    spans : list of (int, int)
+        First and last frame above half of the height.
+    """
+
+    def __init__(self, of_people, std, width):
+        n_people, n_frames = of_people.shape[:2]
+        last = n_frames - 1
+        self._at = [whole(x) for x in np.linspace(0, last, min(n_frames, _MOST_FRAMES))]
+        middles = np.linspace(0, last, round(1 / width) + 1)
+        reach = np.sqrt(2 * np.log(2)) * width * last
+        self.centres = [whole(x) for x in middles]
+        self.spans = [(whole(max(x - reach, 0)), whole(min(x + reach, last))) for x in middles]
+        # The inverse covariance of all frames and signals is I - Z' K Z, divided by the share of
+        # independent frames, for the deviations Z of the people (Woodbury).
+        z = of_people[:, self._at]
+        self._of_people = z.reshape(n_people, -1)
+        ratio = (n_people - 1) * _INDEPENDENT / (1 - _INDEPENDENT)
+        products = self._of_people @ self._of_people.T
+        self._kernel = np.linalg.inv(products + ratio * np.eye(n_people))
+        bumps = np.exp(-0.5 * np.square((self._at - middles[:, np.newaxis]) / (width * last)))
+        self._bumps = bumps[:, :, np.newaxis] / std[self._at]
+        on_people = np.einsum("ckf,nkf->cfn", self._bumps, z[..., -std.shape[1] :])
+        known = np.einsum("cfn,nm,cfm->cf", on_people, self._kernel, on_people)
+        self._squares = (np.square(self._bumps).sum(axis=1) - known) / _INDEPENDENT
+
+    def explain(self, z):
+        """Gains and heights, with signs, of bumps in deviations z (n, P, n_features).
+
+        Returns
+        -------
+        gains, heights : ndarray, shape (n, n_centres, n_columns)
+        """
+        z = z[:, self._at]
+        rows = z.reshape(len(z), -1)
+        weighed = rows - (rows @ self._of_people.T) @ self._kernel @ self._of_people
+        weighed = weighed.reshape(z.shape)[..., -self._bumps.shape[2] :] / _INDEPENDENT
+        sums = np.einsum("ckf,nkf->ncf", self._bumps, weighed)
+        return sums / np.sqrt(self._squares), sums / self._squares
+
+
+class _Expected:
+    """The measures that are expected of a new person of a norm, by the mean of k trials.
 
     Parameters
     ----------
     of_people : list of ndarray, shape (n_trials_i, P, n_features)
+        The trials of each person; the last feature is the offset.
     k : int
     """
-    means = np.stack([x.mean(axis=0) for x in of_people])
-    logs, weights = [], []
-    for i, x in enumerate(of_people):
-        mean, std = _of_norm(np.delete(means, i, axis=0))
-        # Means of k trials, of which each begins with another one.
-        n_starts = len(x) if k < len(x) else 1
-        curves = [np.roll(x, start, axis=0)[:k].mean(axis=0) for start in range(n_starts)]
-        z = np.abs((np.stack(curves) - mean) / std).max(axis=(1, 2))
-        logs.append(np.log(np.maximum(z, np.finfo(float).tiny)))
-        weights.append(np.full(len(z), 1 / len(z)))
-    logs, weights = np.concatenate(logs), np.concatenate(weights)
+
+    def __init__(self, of_people, k):
+        means = np.stack([x.mean(axis=0) for x in of_people])
+        logs, weights = [], []
+        for i, x in enumerate(of_people):
+            # Means of k trials, of which each begins with another one.
+            n_starts = len(x) if k < len(x) else 1
+            curves = [np.roll(x, start, axis=0)[:k].mean(axis=0) for start in range(n_starts)]
+            logs.append(_logs(_People(np.delete(means, i, axis=0)).measures(np.stack(curves))))
+            weights.append(np.full(n_starts, 1 / n_starts))
+        logs, weights = np.concatenate(logs), np.concatenate(weights)
+        of_each = [_moments(x, weights) for x in logs.T]
+        self._middle = np.array([moments.mean for moments in of_each])
+        self._scale = np.array([moments.scale(_PRIOR_VARIANCE) for moments in of_each])
+        largest = self._standardized(logs)
+        # Of all four, of those of the shape, and of the timing.
+        self._largest = [
+            _moments(largest[:, chosen].max(axis=1), weights)
+            for chosen in (slice(None), slice(0, 2), slice(2, 4))
+        ]
+
+    def chances(self, measures):
+        """That a new person has measures (4,) as large: of all, of shape, and of timing."""
+        all_four = self._standardized(_logs(measures))
+        each = all_four.max(), all_four[:2].max(), all_four[2:].max()
+        pairs = zip(self._largest, np.exp(each), strict=True)
+        return [moments.tail(value, _PRIOR_OF_LARGEST) for moments, value in pairs]
+
+    def limits(self, level):
+        """The largest measures (4,) that are no departure."""
+        largest = np.log(self._largest[0].upper_limit(1 - level, _PRIOR_OF_LARGEST))
+        return np.exp(self._middle + largest * self._scale)
+
+    def _standardized(self, logs):
+        return (logs - self._middle) / self._scale
+
+
+def _logs(measures):
+    return np.log(np.maximum(measures, LEAST))
+
+
+def _moments(logs, weights):
+    """The `LogMoments` of values of people, by their logarithms (n,); weights of one add to 1."""
     mean = np.average(logs, weights=weights)
-    return LogMoments(len(means), float(mean), float(weights @ np.square(logs - mean)))
+    n_people = round(weights.sum())
+    return LogMoments(n_people, float(mean), float(weights @ np.square(logs - mean)))
 
 
 def _people_of_norm(y, norm, groups, n):
@@ -328,51 +451,66 @@ def _people_of_norm(y, norm, groups, n):
     return of_norm, subjects
 
 
-def _verdicts(subjects, counts, p, level):
-    """The table of verdicts of subjects, from the probabilities p (n, 2) in shape and in timing."""
-    joint = np.minimum(1, 2 * p.min(axis=1))
-    columns = {"group": [group for _, group, _ in subjects], "n_trials": counts, "p": joint}
-    columns |= {"p_shape": p[:, 0], "p_timing": p[:, 1], "differs": joint <= level}
+def _verdicts(subjects, counts, p, measures, limits):
+    """The table of verdicts of subjects, from the probabilities p (n, 3)."""
+    columns = {"group": [group for _, group, _ in subjects], "n_trials": counts, "p": p[:, 0]}
+    columns |= {"p_shape": p[:, 1], "p_timing": p[:, 2]}
+    columns["differs"] = (measures > limits).any(axis=1)
     return pd.DataFrame(columns, index=pd.Index([label for label, *_ in subjects], name="subject"))
 
 
-def _departures(z, differences, limits, verdicts, names, units, aligned):
-    """The table of departures, at most five a subject."""
-    rows = []
-    size = np.abs(z)
+def _departures(people, curves, limits, verdicts, names, units, clock):
+    """The table of departures, at most five a subject, the farthest beyond its limit first."""
+    z, rows = people.deviations(curves), []
+    explained = people.gains(z)
     for i, label in enumerate(verdicts.index):
-        departures = []
-        # Stretches above a share of the limit, in which it is exceeded somewhere.
-        above_share = size[i] / limits[i] > _BETWEEN
-        stretches = [
-            (k, slice(*stretch))
-            for k in range(len(names))
-            for stretch in runs_of(above_share[:, k])
-        ]
-        for feature, stretch in stretches:
-            sizes = size[i, stretch, feature]
-            beyond = stretch.start + np.flatnonzero(sizes > limits[i, feature])
-            if not len(beyond):
-                continue
-            peak = stretch.start + first_largest(sizes)
-            is_timing = feature == len(names) - 1
+        places = []
+        for k in range(len(names)):
+            is_timing = k == len(names) - 1
+            limit, limit_of_bumps = limits[i, 2:] if is_timing else limits[i, :2]
+            of_feature = [
+                (abs(z[i, peak, k]) / limit, k, first, last, peak, z[i, peak, k])
+                for first, last, peak in _stretches(np.abs(z[i, :, k]), limit)
+            ]
+            bumps = people.bumps[is_timing]
+            gains, heights = (x[i, :, 0 if is_timing else k] for x in explained[is_timing])
+            best = first_largest(np.abs(gains))
+            (first, last), peak = bumps.spans[best], bumps.centres[best]
+            # A bump that is far from all people, too, is told once.
+            is_told = any(a <= last and first <= b for _, _, a, b, *_ in of_feature)
+            excess = abs(gains[best]) / limit_of_bumps
+            if excess > 1 and not is_told:
+                deviation = heights[best] / people.std[peak, k]
+                of_feature.append((excess, k, first, last, peak, deviation))
+            places += of_feature
+        places.sort(key=lambda place: -place[0])
+        for _, k, first, last, peak, deviation in places[:_MOST]:
+            is_timing = k == len(names) - 1
             above, below = ("later", "earlier") if is_timing else ("above", "below")
-            departures.append(
+            rows.append(
                 {
                     "subject": label,
                     "what": "timing" if is_timing else "shape",
-                    "feature": names[feature],
-                    "start": aligned.clock[beyond[0]],
-                    "end": aligned.clock[beyond[-1]],
-                    "peak": aligned.clock[peak],
-                    "direction": above if z[i, peak, feature] > 0 else below,
-                    "size": differences[i, peak, feature],
-                    "unit": units[feature],
-                    "deviation": z[i, peak, feature],
+                    "feature": names[k],
+                    "start": clock[first],
+                    "end": clock[last],
+                    "peak": clock[peak],
+                    "direction": above if deviation > 0 else below,
+                    "size": deviation * people.std[peak, k],
+                    "unit": units[k],
+                    "deviation": deviation,
                 }
             )
-        rows += sorted(departures, key=lambda row: -abs(row["deviation"]))[:_MOST]
     return pd.DataFrame(rows, columns=_COLUMNS)
+
+
+def _stretches(sizes, limit):
+    """First and last frame beyond a limit, and the peak, of stretches of sizes (P,)."""
+    # They end where sizes fall below a share of the limit.
+    for start, stop in runs_of(sizes > _BETWEEN * limit):
+        beyond = start + np.flatnonzero(sizes[start:stop] > limit)
+        if len(beyond):
+            yield int(beyond[0]), int(beyond[-1]), start + first_largest(sizes[start:stop])
 
 
 def _profile(curves, of_norm, aligned, norm_trials, subjects, names, units):

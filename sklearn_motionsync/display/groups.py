@@ -428,7 +428,7 @@ class NormDisplay(Display):
     spread_ : list of FillBetweenPolyCollection
         One standard deviation of the norm, one a panel.
     departures_ : list of LineCollection
-        The parts of the subject outside the limits, one a panel.
+        The parts of the subject that depart, one a panel: outside the limits, or a bump.
 
     Examples
     --------
@@ -525,6 +525,7 @@ class NormDisplay(Display):
     def _draw(self):
         norm = self.comparison
         subject = norm.verdicts.index.get_loc(self.subject)
+        departures = norm.departures[norm.departures["subject"] == self.subject]
         self.subject_, self.mean_, self.bands_, self.spread_, self.departures_ = empty_lists(5)
         clock, grey, violet = norm.clock, COLORS["envelope"], COLORS["departure"]
         for axis, k in zip(self.axes_, [*self.signals, -1], strict=True):
@@ -542,7 +543,15 @@ class NormDisplay(Display):
             line = front_line(axis, clock, curve, color=COLORS["trial"], linewidth=2.4)
             self.subject_.append(line)
             xs, ys = parts_outside(curve[np.newaxis], mean - reach, mean + reach)
-            lines = curves(axis, self.axis.convert(xs), ys, colors=violet, linewidths=2.8, zorder=5)
+            xs, ys = [*self.axis.convert(xs)], [*ys]
+            rows = departures[departures["feature"] == norm.features[k]]
+            for start, end in zip(rows["start"], rows["end"], strict=True):
+                part = (clock >= start) & (clock <= end)
+                # A bump may stand out inside the limits.
+                if not np.any(np.abs(curve - mean)[part] > reach[part]):
+                    xs.append(clock[part])
+                    ys.append(curve[part])
+            lines = curves(axis, xs, ys, colors=violet, linewidths=2.8, zorder=5)
             self.departures_.append(lines)
         ylabels = [*self.labels, offset_label(norm.unit)]
         self._label_axes(self.axes_, ylabels, self.axis.label, ends=clock)
@@ -551,7 +560,7 @@ class NormDisplay(Display):
         labels = [
             f"{self.subject}: {counted(n_trials, 'trial')}",
             f"norm: mean and standard deviation of {norm.n_people} people",
-            f"{100 * (1 - norm.level):.3g} % of new people stay inside in all panels",
+            f"at least {100 * (1 - norm.level):.3g} % of new people stay inside in all panels",
         ]
         if any(len(lines.get_segments()) for lines in self.departures_):
             handles.insert(1, self.departures_[0])

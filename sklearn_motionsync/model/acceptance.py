@@ -67,6 +67,10 @@ class LogMoments:
         apart = np.log(max(value, np.finfo(float).tiny)) - self.mean
         return float(student.sf(apart / scale, freedom))
 
+    def scale(self, prior_variance=_PRIOR_VARIANCE):
+        """The standard error of the logarithm of a new value less the mean."""
+        return _prediction(self.n, self.squares, prior_variance)[1]
+
     def standardize(self, values, prior_variance=_PRIOR_VARIANCE):
         """Deviations of the logarithms of values from the mean, in standard deviations."""
         squares = self.squares + PRIOR_COUNT * prior_variance

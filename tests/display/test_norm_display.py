@@ -41,7 +41,7 @@ def test_lines_and_bands_are_those_of_the_comparison(found):
             assert abs(drawn.min() - rows["start"].min()) < 2
             assert abs(drawn.max() - rows["end"].max()) < 2
     assert display.axes_[1].get_ylabel() == "x1 (degrees)"
-    assert "80 % of new people stay inside in all panels" in texts(display.axes_[0])
+    assert "at least 80 % of new people stay inside in all panels" in texts(display.axes_[0])
     title = display.axes_[0].get_legend().get_title().get_text().replace("\n", " ")
     assert title == found.describe(subject)
 
