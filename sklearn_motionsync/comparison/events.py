@@ -96,7 +96,7 @@ def compare_events(
     -----
     A person counts once, by the mean of the trials that have the event. A person without it does
     not count for this event. p is by permutations of people, as in `compare_groups`, of the largest
-    deviate over all events.
+    deviate over all events: of groups by Welch's t, as they may vary differently.
 
     Examples
     --------

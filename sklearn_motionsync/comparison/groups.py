@@ -205,7 +205,9 @@ def compare_groups(
     Notes
     -----
     1. Values at every frame are compared by t, or F of several groups, and become standard normal
-       deviates z of the same tail probability. So features and offsets count alike.
+       deviates z of the same tail probability. So features and offsets count alike. Groups may vary
+       differently: the variance of each has a factor, its ratio to that of all, smoothed over a
+       fifth of the clock, by which people are scaled when they are permuted.
     2. Neighbouring frames add up by threshold-free cluster enhancement (Smith and Nichols,
        *NeuroImage* 44, 2009): the sum over heights h below z of ``extent^0.5 h^2``.
     3. In each permutation the largest value over all frames and features gives p of shape, that of

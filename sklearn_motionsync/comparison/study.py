@@ -34,6 +34,10 @@ _VARIES = 1e-3
 _STEP, _EXTENT, _HEIGHT = 0.1, 0.5, 2.0
 # Largest standard normal deviate.
 _LARGEST = 8.0
+# The least factor of the variance of a group: one that does not vary has no other.
+_LEAST_FACTOR = 1e-3
+# The spread of a group relative to the others is smoothed by a Gaussian of this share of the clock.
+_OF_CLOCK = 0.2
 # Permutations that are looked at together.
 _BATCH = 250
 
@@ -103,11 +107,9 @@ class Study:
         if counts.min() < 2:
             of = ", ".join(f"{c} in {name!r}" for c, name in zip(counts, labels, strict=True))
             raise ValueError(f"At least two people a group are needed, got {of}.")
-        columns = (of_units[:, np.newaxis] == np.arange(1, len(labels))).astype(float)
         listed = f"{', '.join(labels[:-1])} and {labels[-1]}"
         words = f"{listed}, {_count_units(len(of_units), n, groups is not None)}"
-        design = Design(columns - columns.mean(axis=0))
-        return cls(design, maker, of_units, None, labels, words)
+        return cls(GroupDesign(of_units), maker, of_units, None, labels, words)
 
     @classmethod
     def _of_pairs(cls, codes, labels, persons, names):
@@ -379,6 +381,15 @@ class Design:
         design.rows = self.rows[order]
         return design
 
+    @property
+    def observed(self):
+        """The arrangement of the units themselves, as of `permuted`."""
+        return self.rows
+
+    def prepare(self, values):
+        """What `deviates` takes of values (n_units, P, n_features)."""
+        return scaled(values, not self.flips)
+
     def permuted(self, random_state):
         """The rows after one random permutation."""
         n = len(self.rows)
@@ -404,9 +415,117 @@ class Design:
         explained = np.minimum(np.square(by_column).sum(axis=1), 1 - _ROUNDING)
         ratio = explained / (1 - explained) * (self.left / k)
         if k == 1:
-            t = np.sqrt(ratio) * np.sign(by_column[:, 0])
-            return np.sign(t) * np.minimum(norm.isf(student.sf(np.abs(t), self.left)), _LARGEST)
+            return self._of_t(np.sqrt(ratio) * np.sign(by_column[:, 0]))
+        return self._of_f(ratio, k)
+
+    def _of_t(self, t):
+        return np.sign(t) * np.minimum(norm.isf(student.sf(np.abs(t), self.left)), _LARGEST)
+
+    def _of_f(self, ratio, k):
         return np.clip(norm.isf(fisher.sf(ratio, k, self.left)), 0, _LARGEST)
+
+
+class GroupDesign(Design):
+    """Groups of units, which may vary differently.
+
+    Each group has a factor of its variance, at each frame and in each feature: its ratio to that
+    of all groups, smoothed along the clock. Groups are compared by t or F with these factors. A
+    unit is permuted as its deviation from the common mean, divided by the root of the factor of its
+    own group and multiplied by that of the place it gets. Deviations of a finite set sum to 0 in
+    all permutations, so what is common to all places is drawn as well, by random signs. Where all
+    groups vary alike it cancels out, and the test is the usual one.
+
+    Parameters
+    ----------
+    groups : ndarray of int, shape (n_units,)
+    """
+
+    def __init__(self, groups):
+        self.counts = np.bincount(groups)
+        members = (groups[:, np.newaxis] == np.arange(len(self.counts))).astype(float)
+        super().__init__(members[:, 1:] - members[:, 1:].mean(axis=0))
+        self.members = members
+
+    def rearranged(self, order):
+        design = super().rearranged(order)
+        design.members = self.members[order]
+        return design
+
+    @property
+    def observed(self):
+        return np.column_stack([self.members, np.zeros(len(self.members))])
+
+    def permuted(self, random_state):
+        """The members after one permutation, and the weights of what is common to all places."""
+        n = len(self.members)
+        places = self.members[random_state.permutation(n)]
+        signs = random_state.choice([-1.0, 1.0], size=n)
+        return np.column_stack([places, signs / np.sqrt(n * (n - 1))])
+
+    def prepare(self, values):
+        """Deviations with a common variance, whether they are known, and factors of variances."""
+        values = values - np.nanmean(values, axis=0)
+        spread = np.sqrt(np.nansum(np.square(values), axis=0))
+        varies = spread > _VARIES * spread.max(axis=0)
+        known = np.isfinite(values) & varies
+        values = np.where(known, values, 0)
+        counts, means, variances = self._moments(self.members[np.newaxis], values, known)
+        factors = self._factors(counts, variances)[0]
+        weights = counts[0] / factors
+        middle = (weights * means[0]).sum(axis=0) / weights.sum(axis=0)
+        groups = self.members.argmax(axis=1)
+        deviations = np.where(known, (values - middle) / np.sqrt(factors[groups]), 0)
+        common = deviations.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        return np.where(known, deviations - common, 0), known, factors, common
+
+    def deviates(self, rows, units):
+        """As of a `Design`, of members and weights (n_draws, n_units, n_groups + 1)."""
+        z, known, factors, common = units
+        counts, means, variances = self._moments(rows[..., :-1], z, known)
+        # The units themselves have their own common mean.
+        shared = np.einsum("dn,npf->dpf", rows[..., -1], z, optimize=True)
+        shared[~rows[..., -1].any(axis=1)] = common
+        means = (means + shared[:, np.newaxis]) * np.sqrt(factors)
+        variances = variances * factors
+        factors = self._factors(counts, variances)
+        freedom, k = np.maximum(counts - 1, 0), len(self.counts) - 1
+        variance = (freedom * variances / factors).sum(axis=1) / np.maximum(freedom.sum(axis=1), 1)
+        weights = counts / factors
+        if k == 1:
+            size = means[:, 1] - means[:, 0]
+            error = np.sqrt(variance * (1 / weights).sum(axis=1))
+            return self._of_t(_ratio(size, error))
+        middle = (weights * means).sum(axis=1) / weights.sum(axis=1)
+        explained = (weights * np.square(means - middle[:, np.newaxis])).sum(axis=1) / k
+        return self._of_f(_ratio(explained, variance), k)
+
+    def _moments(self, members, values, known):
+        """Counts, means and variances (n_draws, n_groups, P, n_features) of groups."""
+        counts = np.maximum(
+            np.einsum("dng,npf->dgpf", members, known.astype(float), optimize=True), 1
+        )
+        means = np.einsum("dng,npf->dgpf", members, values, optimize=True) / counts
+        squares = np.einsum("dng,npf->dgpf", members, np.square(values), optimize=True) / counts
+        variances = np.maximum(squares - np.square(means), 0) * counts / np.maximum(counts - 1, 1)
+        return counts, means, variances
+
+    def _factors(self, counts, variances):
+        """The variance of each group relative to that of all, smoothed along the clock."""
+        freedom = np.maximum(counts - 1, 0)
+        total = np.maximum(freedom.sum(axis=1, keepdims=True), 1)
+        pooled = (freedom * variances).sum(axis=1, keepdims=True) / total
+        ratios = np.divide(variances, pooled, out=np.ones_like(variances), where=pooled > 0)
+        frames = np.arange(variances.shape[2])
+        apart = (frames - frames[:, np.newaxis]) / max(_OF_CLOCK * frames[-1], 1)
+        kernel = np.exp(-0.5 * np.square(apart))
+        smoothed = (kernel / kernel.sum(axis=1, keepdims=True)) @ ratios
+        return np.maximum(smoothed, _LEAST_FACTOR)
+
+
+def _ratio(size, error):
+    """Sizes in units of an error; where there is none, 0 or infinite."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.nan_to_num(size / error, nan=0.0)
 
 
 def scaled(values, centred):
@@ -508,9 +627,9 @@ def families(design, curves, n_permutations, random_state, *, by=(), n_jobs=None
     """
     order = _order_of_values([curves[0], *by], design.flips)
     design, curves = design.rearranged(order), [values[order] for values in curves]
-    draws = [design.rows, *(design.permuted(random_state) for _ in range(n_permutations))]
+    draws = [design.observed, *(design.permuted(random_state) for _ in range(n_permutations))]
     portions = [np.stack(draws[k : k + _BATCH]) for k in range(0, len(draws), _BATCH)]
-    units = [scaled(values, not design.flips) for values in curves]
+    units = [design.prepare(values) for values in curves]
     work = [(design, rows, values) for values in units for rows in portions]
     step = progress.stage("permutations", len(work))
     results = list(run(_enhanced_draws, work, n_jobs=n_jobs, prefer="threads", step=step))
