@@ -16,8 +16,6 @@ from ..matching.tile import TIE, Bases, Tile, right_factor
 _BRIDGED = 3
 # After so many widths both filters have forgotten everything.
 _FORGOTTEN = 40
-# After so many samples costs are counted from the least one, so that they stay precise.
-REBASED = 4096
 
 
 class CausalDerivative:
@@ -136,7 +134,6 @@ class CausalTrellis:
         # The rows of paths, and of those that begin another attempt.
         self._states, self._others = self._tile.states(2), self._tile.states(2)
         self._energy = np.full(n_streams, self._tile.right[:, 0, -2].sum())
-        self._least_energy, self._passed = self._energy[0], np.zeros(n_streams)
         self._rank = TIE[moving.dtype] * np.arange(trellis.width + 1.0)[:, np.newaxis]
         self._begins = np.zeros(n_streams, dtype=bool)
         self.attempts = np.zeros(n_streams, dtype=np.intp)
@@ -182,13 +179,6 @@ class CausalTrellis:
             # The last position is the first one.
             row = self._last_row()
             row[[0, -1]] = np.minimum(row[0], row[-1])
-        if self.n_samples % REBASED == 0:
-            # Count costs from the least of the last sample on.
-            least = self._last_row().min(axis=0)
-            for states in (self._states, self._others):
-                self._inside(states, self.n_samples - 1)[:] -= least
-            self._passed += least
-            self._energy[:] = self._least_energy
 
     @property
     def costs(self):
@@ -203,7 +193,7 @@ class CausalTrellis:
         """
         row = self._last_row()
         ends = (row + self._rank * self._energy).argmin(axis=0)
-        return ends, np.maximum(self._passed + row[ends, np.arange(len(ends))], 0)
+        return ends, np.maximum(row[ends, np.arange(len(ends))], 0)
 
     def _last_row(self):
         return self._inside(self._states, self.n_samples - 1)
@@ -224,7 +214,7 @@ class CausalTrellis:
         stop = costs.shape[1] if self._cyclic else 1
         first = costs[unit, :stop, begins].T - self.trellis.groups[unit].penalty
         self._inside(self._states, p)[:stop, begins] = first
-        self._passed[begins] = self.attempts[begins] = 0
+        self.attempts[begins] = 0
         begins[:] = False
 
     def _compare_attempts(self, p, moves):
