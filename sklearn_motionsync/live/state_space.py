@@ -87,7 +87,7 @@ class TrackerModel(NamedTuple):
             largest = max(largest, float(update.nis.max()))
         slopes = np.stack([values for values, _ in fits], axis=1)
         unit_noise = np.array([variances[0] for _, variances in fits])
-        velocities = _shrunk(_moments(slopes), _SHRINKAGE)
+        velocities = _shrunk_covariance(slopes, _SHRINKAGE)
         by_velocity = _largest_nis(slopes, unit_noise, noise, velocities, step, clock.memory)
         once = np.ones(n_frames)
         by_pose = _largest_nis(deviations, once, noise, process.covariance, step, clock.memory)
@@ -177,7 +177,7 @@ class MaternProcess(NamedTuple):
 
         The shrinkage is the weight of the diagonal of the covariance.
         """
-        covariance = _shrunk(_moments(deviations), shrinkage)
+        covariance = _shrunk_covariance(deviations, shrinkage)
         # Each feature is scaled by its standard deviation, so that units do not matter.
         lag = _correlation_lag(deviations / np.sqrt(np.diag(covariance)), 0.5)
         longest = _LONGEST * _HALF / np.sqrt(3) * deviations.shape[1]
@@ -233,14 +233,13 @@ class RateProcess(NamedTuple):
         return left * log_rates, self.spread * np.sqrt(1 - left**2)
 
 
-def _moments(deviations):
-    """Second moments of deviations (..., n_features) about 0."""
+def _shrunk_covariance(deviations, shrinkage):
+    """Second moments of deviations (..., n_features) about 0, shrunk towards their diagonal.
+
+    No variance is 0.
+    """
     flat = deviations.reshape(-1, deviations.shape[-1])
-    return flat.T @ flat / len(flat)
-
-
-def _shrunk(moments, shrinkage):
-    """A covariance shrunk towards its diagonal, whose variances are not 0."""
+    moments = flat.T @ flat / len(flat)
     variances = np.diag(moments)
     largest = variances.max() if variances.max() > 0 else 1.0
     shrunk = (1 - shrinkage) * moments
