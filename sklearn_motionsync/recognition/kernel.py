@@ -1,6 +1,7 @@
 """MotionKernel: how alike trials are, and the multinomial regression with it."""
 
 import numpy as np
+import pandas as pd
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 from scipy.spatial.distance import cdist
@@ -300,12 +301,9 @@ def assign_folds(codes, groups, n_folds=_N_FOLDS):
 
     Without groups the trials of each class are divided evenly, in order.
     """
-    folds = np.empty(len(codes), dtype=np.intp)
     if groups is None:
-        order = np.argsort(codes, kind="stable")
-        starts = np.searchsorted(codes[order], codes[order])
-        folds[order] = (np.arange(len(codes)) - starts) % n_folds
-        return folds
+        return pd.Series(codes).groupby(codes).cumcount().to_numpy() % n_folds
+    folds = np.empty(len(codes), dtype=np.intp)
     splits = GroupKFold(min(n_folds, groups.max() + 1)).split(codes, groups=groups)
     for fold, (_, out) in enumerate(splits):
         folds[out] = fold
