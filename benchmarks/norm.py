@@ -12,7 +12,7 @@ by one, five or ten repetitions drawn at random: done right, done wrong, and the
 and 10 % late. Those of people who use the other side are mirrored. Compared are the dimensions of
 an aSpace of limb directions. Per cent that differ at a level of 10 %, by exercise.
 
-*Children*: hip and knee of 39 children (Ramsay and Silverman, from fdatools), each left out in turn:
+*Children*: hip and knee of 39 children (Ramsay and Silverman, from fdatools), each left out once:
 as they are, 5 % late, with 10 and 15 degrees less knee flexion in swing, and with 10 degrees more
 hip flexion. Per cent that differ at a level of 10 %, and those whose first row is of timing. Prints
 Markdown.
