@@ -154,15 +154,14 @@ class Expectation:
         self._belongs = np.zeros((len(between), len(parts)))
         for k, part in enumerate(parts):
             self._belongs[part.columns, k] = 1
-        # Parts of as many columns are treated together.
-        widths = sorted({len(part.columns) for part in parts})
-        self._alike = []
-        for width in widths:
-            of = np.array([k for k, part in enumerate(parts) if len(part.columns) == width])
-            columns = np.array([parts[k].columns for k in of])
-            blocks = between[columns[:, :, np.newaxis], columns[:, np.newaxis]]
-            self._alike.append((of, columns, blocks))
-        self._prepare_windows(windows)
+        self._blocks = [between[np.ix_(part.columns, part.columns)] for part in parts]
+        self._windows, scaled = windows, windows[:, :, np.newaxis] * self.scale
+        weighted = over_time @ scaled
+        self._alone = 1 / np.einsum("wpf,wpf->wf", scaled, weighted)
+        self._inverse = []
+        for part, block in zip(parts, self._blocks, strict=True):
+            products = scaled[..., part.columns].swapaxes(1, 2) @ weighted[..., part.columns]
+            self._inverse.append(np.linalg.inv(products * block))
         self.lags = lags
         shifts = [(shifted(mean, lag) - mean) * self.scale for lag in lags]
         self._shifts = np.array(shifts).reshape(len(lags), *mean.shape)
@@ -171,17 +170,6 @@ class Expectation:
         self._swing_norms = self._norms(self._swing)
         self._whole_norm = np.sum(self._swing * (over_time @ self._swing @ between))
 
-    def _prepare_windows(self, windows):
-        self._windows, scaled = windows, windows[:, :, np.newaxis] * self.scale
-        weighted = self.over_time @ scaled
-        norms = np.einsum("wpf,wpf->wf", scaled, weighted)
-        self._alone = 1 / norms
-        self._inverse = []
-        for _, columns, blocks in self._alike:
-            windows_of_parts, other = scaled[:, :, columns], weighted[:, :, columns]
-            products = np.einsum("wpki,wpkj->wkij", windows_of_parts, other)
-            self._inverse.append(np.linalg.inv(products * blocks))
-
     def weigh(self, deviations):
         """Deviations (K, n_columns) in standard units, by the inverse covariances."""
         return self.over_time @ (deviations * self.scale) @ self.between
@@ -189,13 +177,10 @@ class Expectation:
     def of_windows(self, weighed):
         """Gains (n_windows, n_parts), and the changes of each part, (n_windows, n_columns)."""
         sums = self._windows @ (self.scale * weighed)
-        gains, changes = np.empty((len(sums), len(self.parts))), np.empty_like(sums)
-        for (of, columns, _), inverse in zip(self._alike, self._inverse, strict=True):
-            sums_of_parts = sums[:, columns]
-            change = np.einsum("wkij,wkj->wki", inverse, sums_of_parts)
-            gains[:, of] = (sums_of_parts * change).sum(axis=2)
-            changes[:, columns] = change
-        return gains, changes
+        changes = np.empty_like(sums)
+        for part, inverse in zip(self.parts, self._inverse, strict=True):
+            changes[:, part.columns] = (inverse @ sums[:, part.columns, np.newaxis])[..., 0]
+        return (sums * changes) @ self._belongs, changes
 
     def of_windows_alone(self, deviations):
         """The largest gain (n_parts,) of a window where other parts tell nothing."""
@@ -227,12 +212,10 @@ class Expectation:
         return 2 * change * whole - change**2 * self._whole_norm if change < -0.5 else 0.0
 
     def _norms(self, x):
-        out = np.empty(len(self.parts))
-        weighted = self.over_time @ x
-        for of, columns, blocks in self._alike:
-            x_of_parts, other = x[:, columns], weighted[:, columns]
-            out[of] = (np.einsum("pki,pkj->kij", x_of_parts, other) * blocks).sum(axis=(1, 2))
-        return out
+        products, pairs = x.T @ self.over_time @ x, zip(self.parts, self._blocks, strict=True)
+        return np.array(
+            [np.sum(products[np.ix_(part.columns, part.columns)] * block) for part, block in pairs]
+        )
 
 
 class FaultFinder:
