@@ -25,7 +25,7 @@ _NOISE = 0.3
 # A contrast counts if its mean is at least so many of its standard deviations, and the mean
 # difference changes by at least such a share of the movement: 0.1 and less in hops, sitting down
 # and waving, and 0.2 and more where an action has a side (HDM05, UTKinect).
-CLEAR, LARGE = 2, 0.1
+_CLEAR, _LARGE = 2, 0.1
 
 
 @dataclass(frozen=True)
@@ -288,8 +288,8 @@ class Contrast:
         squares = np.square(held_out - self.middle).sum() + PRIOR_COUNT * _CONTRAST_VARIANCE
         std = np.sqrt(squares / (len(d) - 1 + PRIOR_COUNT))
         changes = np.square(self._mean - self._mean.mean(axis=0))
-        is_large = changes.sum() >= LARGE * moved.sum() / len(d)
-        self.is_clear = bool(is_large and self.middle >= CLEAR * std)
+        is_large = changes.sum() >= _LARGE * moved.sum() / len(d)
+        self.is_clear = bool(is_large and self.middle >= _CLEAR * std)
 
     def standardize(self, trials):
         """Contrasts on the scale on which 0 is the action, 1 as much the image, 2 the image."""
@@ -303,3 +303,8 @@ class Contrast:
         # Row by row, so that no contrast depends on other trials.
         products, length = np.vecdot(d, mean), np.vecdot(mean, mean) + self._noise
         return products / length
+
+
+def backwards(trials):
+    """The image of trials (n, P, n_features) on the way back."""
+    return trials[:, ::-1]

@@ -30,7 +30,13 @@ from ..utils.pipelines import (
     steps_to_fit,
     takes_gaps,
 )
-from .acceptance import Acceptance, Contrast, LogPredictionInterval, dissimilarity_tails
+from .acceptance import (
+    Acceptance,
+    Contrast,
+    LogPredictionInterval,
+    backwards,
+    dissimilarity_tails,
+)
 from .action_model import ActionModel
 from .similarity import PersonalReference, TrialStream, movement_energies, warn_of_reference
 from .views import curves_of
@@ -412,7 +418,7 @@ class ActionDetector(LongWorkMixin, MetaEstimatorMixin, BaseEstimator):
 
     def _learn_contrasts(self, whole, mean, names, codes):
         """Contrasts to images of the action that count, by their names."""
-        exchanges = {"reversal": _reversed}
+        exchanges = {"reversal": backwards}
         cosines = names_of_cosines(whole, names)
         if self.sides is not False and cosines is not None:
             arms = [limb for arm in ("left arm", "right arm") for limb in PARTS[arm]]
@@ -542,10 +548,6 @@ class _Tests(NamedTuple):
     contrasts: dict
     stream: TrialStream
     kept_tails: dict
-
-
-def _reversed(trials):
-    return trials[:, ::-1]
 
 
 def _exchanged(columns, signs, trials):

@@ -7,8 +7,7 @@ from scipy.stats import t as student
 
 from ..matching.counting import ROUNDING, first_largest, runs_of
 from ..matching.filters import smooth
-from ..utils.groups import mean_of_others
-from .acceptance import CLEAR, LARGE, PRIOR_COUNT, LogPredictionInterval
+from .acceptance import PRIOR_COUNT, Contrast, LogPredictionInterval, backwards
 
 # All was chosen on HDM05 and two exercises of UI-PRMD (benchmarks/departures.py DATA whole); what
 # each is worth was measured of `_AT_ENDS` and `_FEW_COLUMNS` alone (docs/design.md).
@@ -25,10 +24,8 @@ _SLOW = 0.02
 _ADDED, _PRIOR_VARIANCE = 0.2, 0.015
 # A body moves too little, or too far, if another amplitude explains so much of how it differs.
 _EXPLAINED = 0.35
-# The contrast of one column counts at most so often.
-_MOST_OF_COLUMN = 1.5
-# A trial is backwards from this share of the usual contrast on.
-_OTHER_WAY = -0.5
+# A trial is backwards whose contrast to the way back is beyond this, where 2 is the way back.
+_OTHER_WAY = 1.5
 _KINDS = {
     "start": ("starts early", "starts late"),
     "stop": ("stops late", "stops early"),
@@ -104,14 +101,8 @@ class WholeBody:
         # Trials of one person are alike, so a limit is as sure as so few people make it.
         of_few = dict.fromkeys(("start", "stop", "pause"), _widening(groups, coverage))
         self._of_few = {**of_few, "amplitude": _widening(groups_on_clock, coverage)}
-        differences = on_clock - on_clock[:, ::-1]
-        self._difference = differences.mean(axis=0)
-        of_others = mean_of_others(differences, groups_on_clock)
-        held_out = [self._direction(x, m) for x, m in zip(differences, of_others, strict=True)]
-        changes = np.square(self._difference - self._difference.mean(axis=0)).mean(axis=0)
-        is_large = self._weights @ (changes > LARGE * total) > 0.5
-        self._middle = np.mean(held_out)
-        self._has_direction = bool(is_large and self._middle > CLEAR * np.std(held_out))
+        self._scale = np.divide(1, np.sqrt(total), out=np.zeros_like(total), where=total > 0)
+        self._way = Contrast(self._scale * on_clock, backwards, groups_on_clock)
 
     def find(self, in_time, on_clock):
         """The faults of a trial (P, n_columns), in linear time and on the clock."""
@@ -140,11 +131,10 @@ class WholeBody:
             rarity = abs(excess) / self._of_few[name]
             fault = WholeFault(kind, *places[name], size, unit, abs(excess), rarity, deviation)
             faults.append(fault)
-        if self._has_direction:
-            contrast = self._direction(on_clock - on_clock[::-1], self._difference)
-            # A trial that stands still is like neither way.
-            if contrast < _OTHER_WAY * self._middle:
-                excess = float(1 - contrast / self._middle)
+        if self._way.is_clear:
+            # A trial that stands still is like neither way, which is 1.
+            excess = float(self._way.standardize(self._scale * on_clock[np.newaxis])[0])
+            if excess > _OTHER_WAY:
                 faults.append(WholeFault("backwards", 0.0, 1.0, np.nan, "", excess, np.inf, np.nan))
         return faults
 
@@ -188,12 +178,6 @@ class WholeBody:
         moved = trial - trial.mean(axis=0)
         plain, scaled = (np.square(moved - f * self._swing).sum(axis=0) for f in (1.0, factor))
         return bool(self._weights @ (scaled < _EXPLAINED * plain) > 0.5)
-
-    def _direction(self, difference, mean):
-        """How much a difference from the way back is that of the action: about 1, or -1."""
-        products, norms = (difference * mean).sum(axis=0), np.square(mean).sum(axis=0)
-        ratios = products / np.where(norms > 0, norms, 1)
-        return float(self._weights @ np.clip(ratios, -_MOST_OF_COLUMN, _MOST_OF_COLUMN))
 
 
 def _widening(groups, coverage):
