@@ -624,7 +624,7 @@ class ActionModel(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
 
     def _describe_unseen(self, stream):
         """A text about a value that the trials of fewer than two groups show; or none."""
-        if stream.counts is None or stream.n_groups < 2:
+        if stream.n_groups < 2 or not stream.missing.any():
             return ""
         n_groups = (group_counts(stream.kept, stream.groups) > 0).sum(axis=0)
         if n_groups.min() > 1:

@@ -199,13 +199,11 @@ class Neighbours:
             gaps = np.full(len(batch), self._seen is not None)
             if self._mean is not None:
                 gaps |= np.isnan(batch.sum(axis=(1, 2)))
-            if gaps.any():
-                ratios = np.empty((len(batch), len(self._groups)))
-                if not gaps.all():
-                    ratios[~gaps] = self._ratios(batch[~gaps])
-                ratios[gaps] = list(map(self._ratios_of_seen, batch[gaps]))
-            else:
-                ratios = self._ratios(batch)
+            ratios = np.empty((len(batch), len(self._groups)))
+            if not gaps.all():
+                ratios[~gaps] = self._ratios(batch[~gaps])
+            for i in np.flatnonzero(gaps):
+                ratios[i] = self._ratios_of_seen(batch[i])
             if groups is not None:
                 ratios[groups[rows, np.newaxis] == self._groups] = np.inf
             nearest = np.sort(ratios, axis=1)[:, : self._weights.n_nearest]
@@ -387,12 +385,7 @@ def movement_energies(on_clock, floor=None):
         Above 0.
     """
     on_clock = np.asarray(on_clock, dtype=np.float64)
-    if is_gappy(on_clock):
-        energy, variance = _energies_of_seen(on_clock)
-    else:
-        squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
-        energy = squares.reshape(len(on_clock), -1).sum(axis=1) / on_clock.shape[1]
-        variance = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(axis=2).mean()
+    energy, variance = _energies_of_seen(on_clock)
     if floor is None:
         rounding = np.square(64 * np.finfo(float).eps * np.nanmax(np.abs(on_clock)))
         floor = max(LEAST * variance, rounding * on_clock.shape[2], np.finfo(float).tiny)
@@ -400,7 +393,7 @@ def movement_energies(on_clock, floor=None):
 
 
 def _energies_of_seen(on_clock):
-    """Energies (n,) of trials with gaps, and the variance of all poses.
+    """Energies (n,) of trials, and the variance of all poses, by what was seen.
 
     A feature that a trial never shows has the share of the energy that it has in the others.
     """
@@ -437,8 +430,8 @@ class TrialStream:
         One of every group, then evenly spread; in order.
     n, n_groups : int
         Number of trials, and of their groups.
-    counts : ndarray, shape (P, n_features), or None
-        How many of them show each value; None as long as all show all.
+    counts : ndarray of int, shape (P, n_features)
+        How many of them show each value.
     labels : tuple of pairs
         Labels of groups, and their numbers from 0 in the order of first appearance.
     groups : ndarray of int, shape (n_kept,)
@@ -452,6 +445,7 @@ class TrialStream:
     origin: np.ndarray
     mean_offset: np.ndarray
     squares: np.ndarray
+    counts: np.ndarray
     kept: np.ndarray
     n: int = 0
     n_groups: int = 0
@@ -459,7 +453,6 @@ class TrialStream:
     groups: np.ndarray = field(default_factory=lambda: np.array([], dtype=np.intp))
     priorities: np.ndarray = field(default_factory=lambda: np.array([], dtype=np.uint64))
     dropped: LogMoments = field(default_factory=LogMoments)
-    counts: np.ndarray | None = None
 
     @classmethod
     def starting_at(cls, first):
@@ -469,26 +462,23 @@ class TrialStream:
             seen = ~np.isnan(origin)
             means = np.nansum(origin, axis=0) / np.maximum(seen.sum(axis=0), 1)
             origin = np.where(seen, origin, means)
-        return cls(origin, zeros, zeros, np.empty((0, *first.shape), first.dtype))
+        counts, kept = zeros.astype(np.intp), np.empty((0, *first.shape), first.dtype)
+        return cls(origin, zeros, zeros, counts, kept)
 
     @property
     def mean(self):
         """Of all trials, (P, n_features); NaN where none shows anything."""
-        mean = self.origin + self.mean_offset
-        return mean if self.counts is None else np.where(self.counts > 0, mean, np.nan)
+        return np.where(self.counts > 0, self.origin + self.mean_offset, np.nan)
 
     @property
     def variance(self):
         """Of all trials at every pose, (P, n_features), divided by their number."""
-        if self.counts is None:
-            return self.squares / self.n
         return np.where(self.counts > 0, self.squares / np.maximum(self.counts, 1), np.nan)
 
     @property
     def missing(self):
         """The share (P, n_features) of the trials that do not show a value."""
-        counts = self.n if self.counts is None else self.counts
-        return (self.n - np.broadcast_to(counts, self.origin.shape)) / self.n
+        return (self.n - self.counts) / self.n
 
     def extend(self, trials, groups=None):
         """The stream after more trials.
@@ -548,19 +538,15 @@ class TrialStream:
 
     def _add(self, trials):
         """Number, mean and squares with more trials, by Welford's recurrence."""
-        n, mean, squares = self.n, self.mean_offset.copy(), self.squares.copy()
-        counts = self.counts
+        mean, squares, counts = self.mean_offset.copy(), self.squares.copy(), self.counts.copy()
         for x in trials:
             offset = x - self.origin
-            if is_gappy(offset):
-                seen = ~np.isnan(offset)
-                counts = np.full(x.shape, n) + seen if counts is None else counts + seen
-                # A step of 0 changes neither.
-                offset = np.where(seen, offset, mean)
-            elif counts is not None:
-                counts = counts + 1
-            n += 1
+            seen = ~np.isnan(offset)
+            counts += seen
+            # A step of 0 changes neither.
+            offset = np.where(seen, offset, mean)
             step = offset - mean
-            mean += step / (n if counts is None else np.maximum(counts, 1))
+            mean += step / np.maximum(counts, 1)
             squares += step * (offset - mean)
+        n = self.n + len(trials)
         return {"n": n, "mean_offset": mean, "squares": squares, "counts": counts}
