@@ -54,14 +54,10 @@ def predictive_variance(trials, groups, shrinkage=_SHRINKAGE):
     ndarray, shape (P, n_features)
         Positive, also where trials do not differ.
     """
-    n, codes = len(trials), _at_least_two(groups)
-    squares = np.square(trials - mean_of_others(trials, codes))
-    if is_gappy(squares):
-        n = (~np.isnan(squares)).sum(axis=0)
-        squares = np.nansum(squares, axis=0) / np.maximum(n, 1)
-        n, squares = np.maximum(n, 1), np.where(n > 0, squares, np.nan)
-    else:
-        squares = squares.mean(axis=0)
+    squares = np.square(trials - mean_of_others(trials, _at_least_two(groups)))
+    n_known = (~np.isnan(squares)).sum(axis=0)
+    n = np.maximum(n_known, 1)
+    squares = np.where(n_known > 0, np.nansum(squares, axis=0) / n, np.nan)
     return np.maximum(_shrink(squares, n, shrinkage) * (1 + 1 / n), _floor(trials))
 
 
@@ -171,30 +167,22 @@ def mean_band(trials, groups, coverage, random_state=None):
     """
     random_state = check_random_state(random_state)
     codes = _at_least_two(groups)
-    sums, counts = sums_of_groups(np.nan_to_num(trials), codes)
-    n_groups, n, shape = len(sums), len(trials), trials.shape[1:]
-    weights, n_seen = counts[:, 0, 0] / n, n_groups
-    if is_gappy(trials):
-        # Each value has weights of its own: a group that does not show it has none.
-        counts = group_counts(trials, codes)
-        weights = (counts / counts.sum(axis=0)).reshape(n_groups, -1)
-        n_seen = (counts > 0).sum(axis=0)
+    sums, counts = sums_of_groups(np.nan_to_num(trials), codes)[0], group_counts(trials, codes)
+    n_groups, shape, floor = len(sums), trials.shape[1:], _floor(trials) / len(trials)
+    # Each value has weights of its own: a group that does not show it has none.
+    shown = (counts > 0).reshape(n_groups, -1)
+    weights, n_seen = (counts / counts.sum(axis=0)).reshape(n_groups, -1), shown.sum(axis=0)
     # Without group g the mean changes by w_g / (1 - w_g) (mean - mean_g).
-    jackknife = (1 - 1 / np.ravel(n_seen)) * np.square(weights / (1 - weights))
-    floor = _floor(trials) / n
+    jackknife = (1 - 1 / n_seen) * np.square(weights / (1 - weights))
 
     def estimate(means):
-        mean = _weigh(weights, means)
-        squares = _weigh(jackknife, np.square(means - mean)).reshape(shape)
-        return mean, np.sqrt(np.maximum(_shrink(squares, n_seen), floor)).ravel()
+        mean = np.einsum("gv,gv->v", weights, means)
+        squares = np.einsum("gv,gv->v", jackknife, np.square(means - mean)).reshape(shape)
+        variance = _shrink(squares, n_seen.reshape(shape))
+        return mean, np.sqrt(np.maximum(variance, floor)).ravel()
 
     means = (sums / np.maximum(counts, 1)).reshape(n_groups, -1)
-    if n_seen is n_groups:
-        scatter = (means - means.mean(axis=0)) / np.sqrt(n_groups - 1)
-    else:
-        shown = counts.reshape(n_groups, -1) > 0
-        deviations = np.where(shown, means - means.sum(axis=0) / np.ravel(n_seen), 0)
-        scatter = deviations / np.sqrt(np.ravel(n_seen) - 1)
+    scatter = np.where(shown, means - means.sum(axis=0) / n_seen, 0) / np.sqrt(n_seen - 1)
     # Drawn means about their average are independent of that average: each draw of the former,
     # which takes longer, is combined with several of the latter. Few groups vary most.
     n_draws = max(_N_DRAWS // n_groups, _MIN_DRAWS)
@@ -220,11 +208,6 @@ def clock_error(mean, lower, upper):
     return np.abs(np.gradient(mean, axis=0)) * error[:, np.newaxis]
 
 
-def _weigh(weights, values):
-    """The weighted sum of values (n, m): one weight a row, or weights (n, m)."""
-    return weights @ values if weights.ndim == 1 else (weights * values).sum(axis=0)
-
-
 def _at_least_two(groups):
     """Codes of the groups; of a single group, every trial is one of its own."""
     codes = np.unique(groups, return_inverse=True)[1].ravel()
@@ -237,8 +220,6 @@ def _shrink(squares, n, shrinkage=_SHRINKAGE):
     Where one is not known (NaN) it is that mean.
     """
     is_known = ~np.isnan(squares)
-    if is_known.all():
-        return ((n - 1) * squares + shrinkage * squares.mean(axis=0)) / (n - 1 + shrinkage)
     mean = np.nansum(squares, axis=0) / np.maximum(is_known.sum(axis=0), 1)
     return np.where(is_known, ((n - 1) * squares + shrinkage * mean) / (n - 1 + shrinkage), mean)
 
