@@ -18,7 +18,7 @@ from ..body.limbs import PARTS, names_of_cosines
 from ..body.mirror import exchange_of_sides
 from ..inputs.types import Labels, TrialsLike
 from ..matching.counting import first_largest
-from ..matching.gaps import fill_with_mean, is_gappy
+from ..matching.gaps import fill_with_mean
 from ..utils.groups import encode_groups, group_counts
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
@@ -556,8 +556,6 @@ def _exchanged(columns, signs, trials):
 
 def _seen_columns(whole, codes):
     """Features of which two groups show every frame: all, unless there are gaps."""
-    if not is_gappy(whole):
-        return np.arange(whole.shape[2])
     n_groups = (group_counts(whole, codes) > 0).sum(axis=0)
     return np.flatnonzero(n_groups.min(axis=0) > 1)
 

@@ -458,10 +458,9 @@ class TrialStream:
     def starting_at(cls, first):
         """An empty stream with a trial (P, n_features) as its origin."""
         zeros, origin = np.zeros(first.shape), first.astype(np.float64)
-        if is_gappy(origin):
-            seen = ~np.isnan(origin)
-            means = np.nansum(origin, axis=0) / np.maximum(seen.sum(axis=0), 1)
-            origin = np.where(seen, origin, means)
+        seen = ~np.isnan(origin)
+        means = np.nansum(origin, axis=0) / np.maximum(seen.sum(axis=0), 1)
+        origin = np.where(seen, origin, means)
         counts, kept = zeros.astype(np.intp), np.empty((0, *first.shape), first.dtype)
         return cls(origin, zeros, zeros, counts, kept)
 
