@@ -26,10 +26,10 @@ pipe = make_pipeline(
     DirectionCosines(bunch.skeleton), ASpace(6), DenseSynchronizer(n_frames=60), ActionModel()
 )
 grid = {
-    "densesynchronizer__smoothness": [0.0003, 0.003, 0.03, 0.3],
-    "densesynchronizer__max_offset": [0.05, 0.15, 0.25],
+    "densesynchronizer__smoothness": [0.0003, 0.003, 0.03],
+    "densesynchronizer__max_offset": [0.05, 0.25],
 }
-search = GridSearchCV(pipe, grid, cv=GroupKFold(4)).fit(bunch.data, groups=bunch.actor)
+search = GridSearchCV(pipe, grid, cv=GroupKFold(3)).fit(bunch.data, groups=bunch.actor)
 search.best_params_
 
 # %%
