@@ -465,9 +465,7 @@ class GroupDesign(Design):
     def prepare(self, values):
         """Deviations with a common variance, whether they are known, and factors of variances."""
         values = values - np.nanmean(values, axis=0)
-        spread = np.sqrt(np.nansum(np.square(values), axis=0))
-        varies = spread > _VARIES * spread.max(axis=0)
-        known = np.isfinite(values) & varies
+        known = np.isfinite(values) & _varies(np.sqrt(np.nansum(np.square(values), axis=0)))
         values = np.where(known, values, 0)
         counts, means, variances = self._moments(self.members[np.newaxis], values, known)
         factors = self._factors(counts, variances)[0]
@@ -537,8 +535,13 @@ def scaled(values, centred):
         values = values - np.nanmean(values, axis=0)
     values = np.nan_to_num(values)
     length = np.sqrt(np.square(values).sum(axis=0))
-    varies = length > _VARIES * length.max(axis=0)
-    return np.divide(values, length, out=np.zeros_like(values), where=varies)
+    return np.divide(values, length, out=np.zeros_like(values), where=_varies(length))
+
+
+def _varies(spread):
+    """Which values (P, n_features) vary among units; a feature may vary by rounding alone."""
+    largest = spread.max(axis=0)
+    return spread > np.maximum(_VARIES * largest, _ROUNDING * largest.max())
 
 
 def enhanced(deviates):
