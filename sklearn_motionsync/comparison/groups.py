@@ -271,7 +271,7 @@ def compare_aligned(
     for name in ("start", "end", "peak"):
         table[name] = aligned.clock[table[name].to_numpy(dtype=int)]
     return GroupComparison(
-        p_joint=float(share_at_most(least, least[0])),
+        p_joint=max(float(share_at_most(least, least[0])), study.design.floor),
         p_shape=shape.p_value,
         p_timing=timing.p_value,
         p_linear=linear.p_value,
@@ -292,6 +292,7 @@ def _clusters(what, family, values, names, units, study, least, level):
     """Rows of the table: stretches of frames with a corrected p of the level at most."""
     # The share of permutations in which shape or timing has a p as small.
     p = share_at_most(least, family.shares(np.abs(family.observed)))
+    p = np.maximum(p, study.design.floor)
     for k, feature in enumerate(names):
         for first, end in runs_of(p[:, k] <= level).tolist():
             stretch = slice(first, end)

@@ -172,13 +172,11 @@ class Study:
         if self.design.flips:
             return 2 / 2**n
         if self.groups is not None:
-            sizes = np.bincount(self.groups).tolist()
-            alike = math.prod(map(math.factorial, Counter(sizes).values()))
-        else:
-            values = np.sort(self.covariate)
-            sizes = np.unique(values, return_counts=True)[1].tolist()
-            is_symmetric = np.allclose(values + values[::-1], values[0] + values[-1])
-            alike = 2 if is_symmetric else 1
+            return self.design.floor
+        values = np.sort(self.covariate)
+        sizes = np.unique(values, return_counts=True)[1].tolist()
+        is_symmetric = np.allclose(values + values[::-1], values[0] + values[-1])
+        alike = 2 if is_symmetric else 1
         return alike * math.prod(map(math.factorial, sizes)) / math.factorial(n)
 
     def size(self, values, what):
@@ -368,7 +366,14 @@ class Design:
         Centred, unless signs are flipped.
     flips : bool, default=False
         Whether the signs of rows are flipped, as of paired differences, instead of a permutation.
+
+    Attributes
+    ----------
+    floor : float
+        No p is below it.
     """
+
+    floor = 0.0
 
     def __init__(self, columns, flips=False):
         rows, triangle = np.linalg.qr(columns)
@@ -438,10 +443,19 @@ class GroupDesign(Design):
     Parameters
     ----------
     groups : ndarray of int, shape (n_units,)
+
+    Attributes
+    ----------
+    floor : float
+        The share of the arrangements of units that differ as much as the most extreme one: draws of
+        what is common would allow less, but a few units cannot tell more.
     """
 
     def __init__(self, groups):
         self.counts = np.bincount(groups)
+        alike = math.prod(map(math.factorial, Counter(self.counts.tolist()).values()))
+        arranged = math.prod(map(math.factorial, self.counts.tolist()))
+        self.floor = alike * arranged / math.factorial(len(groups))
         members = (groups[:, np.newaxis] == np.arange(len(self.counts))).astype(float)
         super().__init__(members[:, 1:] - members[:, 1:].mean(axis=0))
         self.members = members
@@ -587,6 +601,8 @@ class Family:
         Enhanced values of the design itself, with signs.
     largest : ndarray, shape (1 + n_permutations,)
         The largest absolute value of each draw, that of the design first.
+    floor : float, default=0
+        No share is below it.
 
     Attributes
     ----------
@@ -594,8 +610,8 @@ class Family:
         The share of draws that are at least as large.
     """
 
-    def __init__(self, observed, largest):
-        self.observed, self.largest = observed, largest
+    def __init__(self, observed, largest, floor=0.0):
+        self.observed, self.largest, self.floor = observed, largest, floor
         self.ranks = self.shares(largest)
 
     @property
@@ -607,7 +623,7 @@ class Family:
         """The share of draws whose largest value is at least as large as each value."""
         ordered = np.sort(self.largest)
         below = ordered.searchsorted(np.asarray(values) * (1 - _ROUNDING))
-        return (len(ordered) - below) / len(ordered)
+        return np.maximum((len(ordered) - below) / len(ordered), self.floor)
 
 
 def families(design, curves, n_permutations, random_state, *, by=(), n_jobs=None, progress):
@@ -638,7 +654,10 @@ def families(design, curves, n_permutations, random_state, *, by=(), n_jobs=None
     results = list(run(_enhanced_draws, work, n_jobs=n_jobs, prefer="threads", step=step))
     n = len(portions)
     by_curves = [results[k : k + n] for k in range(0, len(results), n)]
-    return [Family(p[0][0], np.concatenate([largest for _, largest in p])) for p in by_curves]
+    return [
+        Family(p[0][0], np.concatenate([largest for _, largest in p]), design.floor)
+        for p in by_curves
+    ]
 
 
 def _order_of_values(curves, flips):

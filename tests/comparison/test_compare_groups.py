@@ -356,6 +356,18 @@ def test_signals_are_left_out_of_the_match_each_or_in_eight_parts(n, capsys):
 # -- the answers --------------------------------------------------------------------------
 
 
+def test_no_p_of_few_people_is_below_the_share_of_their_arrangements():
+    X = np.random.default_rng(0).standard_normal((6, 30, 1))
+    X[3:] += 30
+    sync = LinearSynchronizer(30).fit(X)
+    found = compare_groups(sync, X, [*"aaabbb"], level=0.1, n_permutations=199)
+    assert found.p_joint == found.p_shape == found.smallest_p == pytest.approx(0.1)
+    assert (found.clusters["p"] == found.smallest_p).all()
+    assert "they differ in shape" in found.describe()
+    too_few = compare_groups(sync, X, [*"aaabbb"], n_permutations=199)
+    assert "too few to find a difference" in too_few.describe()
+
+
 @pytest.mark.parametrize(
     ("aspects", "p", "smallest", "words"),
     [
