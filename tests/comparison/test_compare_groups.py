@@ -358,7 +358,7 @@ def test_signals_are_left_out_of_the_match_each_or_in_eight_parts(n, capsys):
 
 def test_no_p_of_few_people_is_below_the_share_of_their_arrangements():
     X = np.random.default_rng(0).standard_normal((6, 30, 1))
-    X[3:] += 30
+    X[3:] += 8
     sync = LinearSynchronizer(30).fit(X)
     found = compare_groups(sync, X, [*"aaabbb"], level=0.1, n_permutations=199)
     assert found.p_joint == found.p_shape == found.smallest_p == pytest.approx(0.1)
