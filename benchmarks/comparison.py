@@ -1,13 +1,15 @@
 """Whether `compare_groups` keeps its level, and what it finds, beside other tests of curves.
 
     pip install spm1d fdasrsf fdatools
-    python benchmarks/comparison.py DATA_FOLDER [level] [power] [covariate] [peers] [nlreg1d]
-        [--studies N]
+    python benchmarks/comparison.py DATA_FOLDER [level] [unequal] [power] [covariate] [peers]
+        [nlreg1d] [--studies N]
 
 *Level*: studies in which nothing differs, of 8 to 30 people of `make_gait` with two strides, one to
 four signals, groups, pairs or a covariate drawn at random; and of people drawn from the forces of a
 muscle (nlreg1d), in groups at random. Signals are scaled for the match and compared in their units,
-by 199 permutations at 5 %. *Power*: differences that `make_gait`
+by 199 permutations at 5 %. *Unequal*: controls and patients whose smooth curves of one signal have
+so many times their spread, in all frames or in the second half; a bump of patients is so high.
+*Power*: differences that `make_gait`
 makes between 10 or 20 people of two strides, four signals, by 399 permutations. In per cent.
 *Covariate*: an event that moves by 2 % of the trial with a standard deviation of the covariate
 between 12 people, who vary by 2 %, their trials by 1 %; means of people, and slopes within them.
@@ -36,6 +38,7 @@ import contextlib
 import io
 import warnings
 from functools import partial
+from itertools import product
 
 import numpy as np
 from harness import at_frames, command_line, percent, print_head, print_row, run_tables
@@ -88,6 +91,21 @@ def null_study(seed):
         found = compare_groups(pipe, data, **compared(gait, kind, rng), **given)
         rows.append(found.to_frame()["differs"].tolist())
     return rows
+
+
+def unequal_study(seed, n_controls, n_patients, spread, height):
+    """Whether controls and patients are called different."""
+    rng, t = np.random.default_rng(seed), np.linspace(0, 1, 51)
+    root = np.linalg.cholesky(
+        np.exp(-0.5 * ((t - t[:, np.newaxis]) / 0.12) ** 2) + 1e-6 * np.eye(51)
+    )
+    X = rng.standard_normal((n_controls + n_patients, 51)) @ root.T
+    X[n_controls:] *= spread
+    X[n_controls:] += height * np.exp(-0.5 * ((t - 0.5) / 0.1) ** 2)
+    y = [0] * n_controls + [1] * n_patients
+    sync = LinearSynchronizer(51).fit(X)
+    found = compare_groups(sync, X, y, n_permutations=199, random_state=seed)
+    return found.p_joint <= LEVEL
 
 
 def power_study(seed, n_people, params):
@@ -339,6 +357,16 @@ def level_table(folder, n_studies=1000):
             print_row(prefix + name, [f"{x:.1f}" for x in shares])
 
 
+def unequal_table(folder, n_studies=300):
+    """How often groups that vary differently are called different."""
+    print_head("controls, patients, spread, height of a bump", [f"differ in {n_studies} studies"])
+    in_half = np.where(np.arange(51) < 25, 1, 3)
+    for n, spread, height in product(((15, 5), (10, 10), (5, 15)), (1, 1.4, 3, in_half), (0, 1.4)):
+        work = (delayed(unequal_study)(seed, *n, spread, height) for seed in range(n_studies))
+        name = "3 in half" if spread is in_half else f"{spread:g}"
+        print_row(f"{n[0]}, {n[1]}, {name}, {height:g}", [percent(np.mean(Parallel(2)(work)))])
+
+
 def power_table(folder, n_studies=300):
     """How often each answer is given where groups differ."""
     print_head("people, they differ by", ANSWERS)
@@ -409,6 +437,7 @@ def nlreg1d_table(folder):
 
 TABLES = {
     "level": level_table,
+    "unequal": unequal_table,
     "power": power_table,
     "covariate": covariate_table,
     "peers": peer_table,
@@ -418,7 +447,7 @@ TABLES = {
 
 def with_studies(options):
     """Have all tables but the last make so many studies."""
-    for name in [*TABLES][:4] if options.studies else ():
+    for name in [*TABLES][:5] if options.studies else ():
         TABLES[name] = partial(TABLES[name], n_studies=options.studies)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -321,23 +322,14 @@ class _Bumps:
         Of the last features, in which bumps are sought.
     width : float
         The standard deviation of a bump, as a share of the clock.
-
-    Attributes
-    ----------
-    centres : list of int
-        In frames.
-    spans : list of (int, int)
-        First and last frame above half of the height.
     """
 
     def __init__(self, of_people, std, width):
         n_people, n_frames = of_people.shape[:2]
         last = n_frames - 1
-        self._at = [whole(x) for x in np.linspace(0, last, min(n_frames, _MOST_FRAMES))]
-        middles = np.linspace(0, last, round(1 / width) + 1)
-        reach = np.sqrt(2 * np.log(2)) * width * last
-        self.centres = [whole(x) for x in middles]
-        self.spans = [(whole(max(x - reach, 0)), whole(min(x + reach, last))) for x in middles]
+        self._at = whole(np.linspace(0, last, min(n_frames, _MOST_FRAMES)))
+        self._last, self._sigma = last, width * last
+        self._middles = np.linspace(0, last, round(1 / width) + 1)
         # The inverse covariance of all frames and signals is I - Z' K Z, divided by the share of
         # independent frames, for the deviations Z of the people (Woodbury).
         z = of_people[:, self._at]
@@ -345,11 +337,18 @@ class _Bumps:
         ratio = (n_people - 1) * _INDEPENDENT / (1 - _INDEPENDENT)
         products = self._of_people @ self._of_people.T
         self._kernel = np.linalg.inv(products + ratio * np.eye(n_people))
-        bumps = np.exp(-0.5 * np.square((self._at - middles[:, np.newaxis]) / (width * last)))
+        bumps = np.exp(-0.5 * np.square((self._at - self._middles[:, np.newaxis]) / self._sigma))
         self._bumps = bumps[:, :, np.newaxis] / std[self._at]
         on_people = np.einsum("ckf,nkf->cfn", self._bumps, z[..., -std.shape[1] :])
         known = np.einsum("cfn,nm,cfm->cf", on_people, self._kernel, on_people)
         self._squares = (np.square(self._bumps).sum(axis=1) - known) / _INDEPENDENT
+
+    @cached_property
+    def places(self):
+        """First and last frame above half of the height, and the centre: (n_centres, 3)."""
+        reach = np.sqrt(2 * np.log(2)) * self._sigma
+        ends = np.clip([self._middles - reach, self._middles + reach], 0, self._last)
+        return whole(np.column_stack([*ends, self._middles]))
 
     def explain(self, z):
         """Gains and heights, with signs, of bumps in deviations z (n, P, n_features).
@@ -475,7 +474,7 @@ def _departures(people, curves, limits, verdicts, names, units, clock):
             bumps = people.bumps[is_timing]
             gains, heights = (x[i, :, 0 if is_timing else k] for x in explained[is_timing])
             best = first_largest(np.abs(gains))
-            (first, last), peak = bumps.spans[best], bumps.centres[best]
+            first, last, peak = bumps.places[best]
             # A bump that is far from all people, too, is told once.
             is_told = any(a <= last and first <= b for _, _, a, b, *_ in of_feature)
             excess = abs(gains[best]) / limit_of_bumps
