@@ -137,7 +137,7 @@ def compare_events(
     (family,) = families(study.design, curves, n_permutations, rng, progress=progress)
     sizes = [study.size(units[:, k], "timing") for k in range(values.shape[1])]
     table[["direction", "size", "lower", "upper"]] = pd.DataFrame(sizes, index=table.index)
-    table["p"] = family.shares(np.abs(family.observed[0]))
+    table["p"] = np.maximum(family.shares(np.abs(family.observed[0])), family.floor)
     table["differs"] = table["p"] <= level
     return table
 

@@ -602,7 +602,7 @@ class Family:
     largest : ndarray, shape (1 + n_permutations,)
         The largest absolute value of each draw, that of the design first.
     floor : float, default=0
-        No share is below it.
+        No p is below it.
 
     Attributes
     ----------
@@ -617,13 +617,13 @@ class Family:
     @property
     def p_value(self):
         """Of the largest value of all."""
-        return float(self.ranks[0])
+        return max(float(self.ranks[0]), self.floor)
 
     def shares(self, values):
         """The share of draws whose largest value is at least as large as each value."""
         ordered = np.sort(self.largest)
         below = ordered.searchsorted(np.asarray(values) * (1 - _ROUNDING))
-        return np.maximum((len(ordered) - below) / len(ordered), self.floor)
+        return (len(ordered) - below) / len(ordered)
 
 
 def families(design, curves, n_permutations, random_state, *, by=(), n_jobs=None, progress):
