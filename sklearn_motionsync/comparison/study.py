@@ -7,6 +7,7 @@ import warnings
 from collections import Counter
 from copy import copy
 from dataclasses import dataclass
+from functools import lru_cache
 from numbers import Integral, Real
 
 import numpy as np
@@ -424,10 +425,18 @@ class Design:
         return self._of_f(ratio, k)
 
     def _of_t(self, t):
-        return np.sign(t) * np.minimum(norm.isf(student.sf(np.abs(t), self.left)), _LARGEST)
+        return np.sign(t) * np.interp(np.abs(t), *_of_deviates(self.left))
 
     def _of_f(self, ratio, k):
-        return np.clip(norm.isf(fisher.sf(ratio, k, self.left)), 0, _LARGEST)
+        return np.interp(ratio, *_of_deviates(self.left, k))
+
+
+@lru_cache(maxsize=32)
+def _of_deviates(left, k=None):
+    """Values of t, or of F with k degrees of freedom, and the deviates with their tails, 0 to 8."""
+    deviates = np.linspace(0, _LARGEST, 8001)
+    tails = norm.sf(deviates)
+    return student.isf(tails, left) if k is None else fisher.isf(tails, k, left), deviates
 
 
 class GroupDesign(Design):
