@@ -242,13 +242,7 @@ def compare_to_norm(
     of_norm = [values[trials] for trials in norm_trials]
     people = _People(np.stack([x.mean(axis=0) for x in of_norm]))
     curves = np.stack([values[trials].mean(axis=0) for *_, trials in subjects])
-    counts = [len(trials) for *_, trials in subjects]
-    expected = {k: _Expected(of_norm, k) for k in set(counts)}
-    measures = people.measures(curves)
-    p = np.array([expected[k].chances(x) for k, x in zip(counts, measures, strict=True)])
-    # Of the shape, of its bumps, of the timing, and of its bumps.
-    limits = np.array([expected[k].limits(float(level)) for k in counts])
-    verdicts = _verdicts(subjects, counts, p, measures, limits)
+    verdicts, limits = _verdicts(subjects, people.measures(curves), of_norm, float(level))
     names, units = [*aligned.names, "offset"], [*aligned.units, UNITS[aligned.unit]]
     return NormComparison(
         verdicts=verdicts,
@@ -450,12 +444,17 @@ def _people_of_norm(y, norm, groups, n):
     return of_norm, subjects
 
 
-def _verdicts(subjects, counts, p, measures, limits):
-    """The table of verdicts of subjects, from the probabilities p (n, 3)."""
+def _verdicts(subjects, measures, of_norm, level):
+    """The table of verdicts of subjects by their measures (n, 4), and the limits of these."""
+    counts = [len(trials) for *_, trials in subjects]
+    expected = {k: _Expected(of_norm, k) for k in set(counts)}
+    p = np.array([expected[k].chances(x) for k, x in zip(counts, measures, strict=True)])
+    limits = np.array([expected[k].limits(level) for k in counts])
     columns = {"group": [group for _, group, _ in subjects], "n_trials": counts, "p": p[:, 0]}
     columns |= {"p_shape": p[:, 1], "p_timing": p[:, 2]}
     columns["differs"] = (measures > limits).any(axis=1)
-    return pd.DataFrame(columns, index=pd.Index([label for label, *_ in subjects], name="subject"))
+    index = pd.Index([label for label, *_ in subjects], name="subject")
+    return pd.DataFrame(columns, index=index), limits
 
 
 def _departures(people, curves, limits, verdicts, names, units, clock):
