@@ -23,8 +23,7 @@ from .bones import read_acclaim, read_bvh
 from .c3d import read_c3d
 from .gaps import POSITIONS, check_filling, fill_gaps, warn_of_gaps
 from .keypoints import KEYPOINT_FORMATS
-from .labs import MOTIVE, QTM, VICON, read_motive, read_qtm, read_trc, read_vicon
-from .mvnx import read_mvnx
+from .labs import MOTIVE, QTM, VICON, read_motive, read_mvnx, read_qtm, read_trc, read_vicon
 from .text import FARTHEST, make_unique, read_storage, warn
 
 
