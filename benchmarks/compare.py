@@ -7,7 +7,7 @@ has a process of its own, which runs one thread, and the old one the jobs of its
 these if it has none. Of each job: the least milliseconds of the processor, old and new; the ratio
 of the least ones; and the median of the ratios within a round, with its quartiles. On a busy
 machine believe a change only where both ratios show it. At last come the jobs that are slower by
-more than 5 % in both. All jobs take about seven minutes.
+more than 5 % in both. All jobs take about five minutes.
 """
 
 import argparse

@@ -31,7 +31,6 @@ from typing import NamedTuple
 import numpy as np
 import sklearn_motionsync
 from harness import DATA, P, known_warps
-from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionClassifier,
@@ -45,11 +44,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.comparison import compare_groups, compare_to_norm
 from sklearn_motionsync.datasets import load_trials, make_bending
-from sklearn_motionsync.display import (
-    ActionModelDisplay,
-    SkeletonDisplay,
-    SynchronizationDisplay,
-)
+from sklearn_motionsync.display import SkeletonDisplay, SynchronizationDisplay
 from sklearn_motionsync.io import read_motion
 from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
 from sklearn_motionsync.model import find_departures
@@ -76,11 +71,8 @@ def warped_sines(n, seed=0, movement=0, n_features=16):
     Sets of the same ``movement`` show the same one.
     """
     sizes = np.random.default_rng(movement).standard_normal((8, n_features))
-    rng, out, phase = (
-        np.random.default_rng(seed),
-        np.empty((n, P, n_features)),
-        np.linspace(0, 1, P),
-    )
+    rng, phase = np.random.default_rng(seed), np.linspace(0, 1, P)
+    out = np.empty((n, P, n_features))
     for x in out:
         shifts = 0.08 * rng.standard_normal(3)
         waves = sum(a * np.sin(np.pi * k * phase) / k for k, a in enumerate(shifts, start=1))
@@ -125,25 +117,18 @@ class Data:
         """The archive of real motion capture."""
         return load_trials(self.folder / "hdm05" / "hdm05_positions.npz")
 
-    def positions(self, action):
-        """Joint positions of an action."""
-        pairs = zip(self.hdm05.data, self.hdm05.target, strict=True)
-        return [x for x, target in pairs if target == action]
-
-    def _points(self, action):
-        poses = DirectionCosines(self.hdm05.skeleton).fit_transform(self.positions(action))
-        points = ASpace(0.95).fit_transform(poses)
-        return [np.ascontiguousarray(x, dtype=float) for x in points]
-
     @cached_property
     def hop_positions(self):
         """33 hops of four people: joint positions."""
-        return self.positions("hopBothLegs1hops")
+        pairs = zip(self.hdm05.data, self.hdm05.target, strict=True)
+        return [x for x, target in pairs if target == "hopBothLegs1hops"]
 
     @cached_property
     def hops(self):
         """The hops as points of their aSpace."""
-        return self._points("hopBothLegs1hops")
+        poses = DirectionCosines(self.hdm05.skeleton).fit_transform(self.hop_positions)
+        points = ASpace(0.95).fit_transform(poses)
+        return [np.ascontiguousarray(x, dtype=float) for x in points]
 
     @cached_property
     def hops_on_clock(self):
@@ -156,29 +141,9 @@ class Data:
         return [x[:, :1] for x in self.hops_on_clock]
 
     @cached_property
-    def bends(self):
-        """24 bends of four people as points of their aSpace."""
-        return self._points("depositFloorR")
-
-    @cached_property
-    def many_hops(self):
-        """100 trials: hops again and again, each with a random walk of its own."""
-        rng, X = np.random.default_rng(3), []
-        for i in range(100):
-            x = self.hops[i % len(self.hops)]
-            X.append(x + 0.02 * rng.standard_normal(x.shape).cumsum(axis=0) / np.sqrt(50))
-        return X
-
-    @cached_property
     def simulated(self):
         """40 bends of the embedded action."""
         return make_bending(40, random_state=0)
-
-    @cached_property
-    def simulated_points(self):
-        """The same as points of their aSpace."""
-        poses = DirectionCosines(self.simulated.skeleton).fit_transform(self.simulated.data)
-        return [np.ascontiguousarray(x) for x in ASpace(16).fit_transform(poses)]
 
     @cached_property
     def copies(self):
@@ -256,12 +221,6 @@ def detector():
     return ActionDetector(with_model())
 
 
-def detector_pipe(data):
-    """A detector that is given joint positions."""
-    cosines = DirectionCosines(data.hdm05.skeleton)
-    return ActionDetector(make_pipeline(cosines, ASpace(0.95), dense(), ActionModel()))
-
-
 def online(data):
     """A fitted synchronizer of running movements."""
     return OnlineSynchronizer(dense(), frame_rate=120).fit(data.hops)
@@ -309,25 +268,14 @@ def keyframe_ft(data):
     return Work(lambda: LinearSynchronizer(P).fit_transform(X, keyframes=keyframes))
 
 
-def model_only_score(data):
-    return of_all(ActionModel(), dense().fit_transform(data.hops_on_clock), "score_samples")
-
-
-def classified(classifier):
-    """The actions of 30 trials, by a classifier of 60 others."""
-    classifier.fit(*three_actions(20, 0))
+def clf_predict30(data):
+    classifier = ActionClassifier().fit(*three_actions(20, 0))
     return Work(partial(classifier.predict, three_actions(10, 50)[0]))
 
 
 def searched(query):
     """The search for a trial in a long take."""
     return Work(partial(find_trials, query, long_take()))
-
-
-def cosines_1e5(data):
-    poses = data.simulated.data
-    take = [np.resize(poses[0], (100_000, *poses[0].shape[1:]))]
-    return Work(partial(DirectionCosines(data.simulated.skeleton).fit(poses).transform, take))
 
 
 def aspace_fit(data):
@@ -356,11 +304,6 @@ def disp_sync(data):
     return drawn(lambda: SynchronizationDisplay.from_estimator(sync, data.hops_on_clock))
 
 
-def disp_model(data):
-    pipe = with_model().fit(data.hops_on_clock)
-    return drawn(lambda: ActionModelDisplay.from_estimator(pipe, data.hops_on_clock))
-
-
 def disp_skeleton(data):
     bunch = data.simulated
     return drawn(lambda: SkeletonDisplay.from_positions(bunch.data[0], skeleton=bunch.skeleton))
@@ -377,10 +320,6 @@ def blend(data):
     pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(16), dense()).fit(bunch.data)
     pair = bunch.data[:2]
     return Work(lambda: blend_trials(pipe, pair, [0.5, 0.5], skeleton=bunch.skeleton))
-
-
-def clone_params(data):
-    return Work(lambda: [clone(DenseSynchronizer()) for _ in range(50)], 50)
 
 
 def compare_groups40(data):
@@ -407,37 +346,25 @@ JOBS = {
     "fit_source40": lambda data: fit(dense, data.copies),
     "fit_walks40": lambda data: fit(dense, data.walks),
     "fit_hops33": lambda data: fit(dense, data.hops_on_clock),
-    "fit_bends24": lambda data: fit(dense, data.bends),
-    "fit_sim40": lambda data: fit(dense, data.simulated_points),
-    "fit_people100": lambda data: fit(dense, data.many_hops),
     "fit_curves400": lambda data: fit(dense, warped_sines(400)),
     "fit_n10": lambda data: fit(dense, data.hops_on_clock[:10]),
     "fit_n2": lambda data: fit(dense, data.hops_on_clock[:2]),
     "fit_1feature": lambda data: fit(dense, data.hop_feature),
     "paper64_source": lambda data: fit(paper, data.copies),
-    "paper32_source": lambda data: fit(paper, np.float32(data.copies)),
     "paper64_walks": lambda data: fit(paper, data.walks),
     "paper32_walks": lambda data: fit(paper, np.float32(data.walks)),
-    "paper_fit_transform": lambda data: Work(lambda: paper().fit_transform(data.walks)),
-    "fit_transform_hops": lambda data: Work(lambda: dense().fit_transform(data.hops_on_clock)),
     "lone_hops": lambda data: lone(dense(), data.hops_on_clock),
-    "lone_bends": lambda data: lone(dense(), data.bends),
     "lone_source": lambda data: lone(dense(), data.copies),
-    "lone_walks": lambda data: lone(dense(), data.walks),
     "lone_paper": lambda data: lone(paper(), data.walks),
     "lone_1feature": lambda data: lone(dense(), data.hop_feature),
     "all_hops33": lambda data: of_all(dense(), data.hops_on_clock),
-    "all_source40": lambda data: of_all(dense(), data.copies),
     "all_paper40": lambda data: of_all(paper(), data.walks),
     "match_hops33": lambda data: of_all(dense(), data.hops_on_clock, "match"),
     "part_sync": part_sync,
     "linear_ft": lambda data: Work(lambda: LinearSynchronizer(P).fit_transform(data.hops_on_clock)),
     "keyframe_ft": keyframe_ft,
-    "model_fit": lambda data: fit(with_model, data.hops_on_clock),
     "model_only_fit": lambda data: fit(ActionModel, dense().fit_transform(data.hops_on_clock)),
     "model_predict": lambda data: of_all(with_model(), data.hops_on_clock, "predict"),
-    "model_score_samples": lambda data: of_all(with_model(), data.hops_on_clock, "score_samples"),
-    "model_only_score": model_only_score,
     "model_sample": lambda data: on_model(data, lambda pipe: pipe[-1].sample(20, random_state=0)),
     "departures": lambda data: on_model(
         data, lambda pipe: find_departures(pipe, data.hops_on_clock[:5])
@@ -445,23 +372,18 @@ JOBS = {
     "detector_fit": lambda data: fit(detector, data.hops_on_clock),
     "detector_predict": lambda data: of_all(detector(), data.hops_on_clock, "predict"),
     "detector_lone": lambda data: lone(detector(), data.hops_on_clock, "predict"),
-    "detectorpipe_fit": lambda data: fit(partial(detector_pipe, data), data.hop_positions),
-    "detectorpipe_predict": lambda data: of_all(detector_pipe(data), data.hop_positions, "predict"),
-    "detectorpipe_lone": lambda data: lone(detector_pipe(data), data.hop_positions, "predict"),
     "clf_fit60": lambda data: fit(ActionClassifier, *three_actions(20, 0)),
-    "clf_predict30": lambda data: classified(ActionClassifier()),
+    "clf_predict30": clf_predict30,
     "clf_lone": lambda data: each(
         ActionClassifier().fit(*three_actions(20, 0)).predict, warped_sines(5, seed=9), 5
     ),
     "clf_reject_fit60": lambda data: fit(
         partial(ActionClassifier, reject_below="auto"), *three_actions(20, 0)
     ),
-    "clf_reject_predict30": lambda data: classified(ActionClassifier(reject_below="auto")),
     "search_20000": lambda data: searched(warped_sines(1)[0]),
     "search_sync_20000": lambda data: searched(dense().fit(warped_sines(20))),
     "live_step": lambda data: steps(online(data), data.hops[0]),
     "live_fit": lambda data: fit(partial(OnlineSynchronizer, dense(), frame_rate=120), data.hops),
-    "live_step8": lambda data: steps(online(data), np.stack([data.hops[0]] * 8, axis=1)),
     "tracker_fit": lambda data: fit(tracker, data.hops),
     "tracker_track": lambda data: Work(
         partial(tracker().fit(data.hops).track, data.hops[:1]), len(data.hops[0])
@@ -469,11 +391,9 @@ JOBS = {
     "tracker_smooth": lambda data: Work(
         partial(tracker().fit(data.hops).smooth, data.hops[:1]), len(data.hops[0])
     ),
-    "tracker_step": lambda data: steps(tracker().fit(data.hops), data.hops[0]),
     "cosines_hops": lambda data: of_all(
         DirectionCosines(data.hdm05.skeleton), list(data.hdm05.data)
     ),
-    "cosines_1e5": cosines_1e5,
     "aspace_fit": aspace_fit,
     "read_bvh": lambda data: Work(partial(read_motion, data.recorded("bvh/007_01.bvh"))),
     "read_c3d": read_c3d,
@@ -485,11 +405,9 @@ JOBS = {
         partial(synchronization_distances, data.hops_on_clock, cost="pose")
     ),
     "disp_sync": disp_sync,
-    "disp_model": disp_model,
     "disp_skeleton": disp_skeleton,
     "to_frame_match": lambda data: of_match(data, "to_frame"),
     "blend": blend,
-    "clone_params": clone_params,
     "compare_groups40": compare_groups40,
     "compare_norm": compare_norm,
     "report40": report40,

@@ -10,9 +10,8 @@ by 5 cm. Two takes of each actor.
 The peer is a Kalman filter of a Matern-3/2 process about the mean pose of the training people,
 which knows no phase. It is told the covariance of the noise, simulated on training people, and has
 the best of its settings for each column, chosen by the result. The tracker has `JointNoise`. Mean
-error of the joints that are hidden (or moved), over takes, then over actions; the share of hidden
-cosines within bands of 90 %; and frames called lost, of right takes and of other actions under the
-same model. Prints Markdown.
+error of the joints that are hidden (or moved), over takes, then over actions; and the share of
+hidden cosines within bands of 90 %. Prints Markdown.
 """
 
 from itertools import product
@@ -153,11 +152,10 @@ def folds_of(folder):
 
 
 def table(folder):
-    """Errors of ours and of the peer, bands, and frames called lost."""
-    folds, errors, bands, lost = list(folds_of(folder)), {}, {}, {}
-    for k, fold in enumerate(folds):
+    """Errors of ours and of the peer, and bands."""
+    errors, bands = {}, {}
+    for k, fold in enumerate(folds_of(folder)):
         models = {setting: matern(fold.poses, *setting) for setting in SETTINGS}
-        wrong = next(each for each in folds[k:] + folds[:k] if each.action != fold.action)
         for i, (x, kind) in enumerate(product(fold.test, KINDS)):
             sd = LARGE if kind == "moved" else SMALL
             seen, counts = fold.case(x, kind, np.random.default_rng([k, i]))
@@ -173,11 +171,6 @@ def table(folder):
             if hidden.any():
                 inside = np.abs(live.poses - truth) <= wide
                 bands.setdefault(kind, []).append(inside[hidden].mean())
-        for name, takes in (("right", fold.test), ("other", wrong.test[:1])):
-            for x in takes:
-                moved = x + SMALL * np.random.default_rng(k).standard_normal(x.shape)
-                track = fold.trackers[SMALL].track(fold.cosines.transform([moved])[0])
-                lost.setdefault(name, []).append(track.lost.mean())
     print_head("cm", KINDS)
     means = {
         name: [np.mean([np.mean(rows) for rows in by_kind[kind].values()]) for kind in KINDS]
@@ -190,8 +183,6 @@ def table(folder):
     print_row(
         "bands of 90 % hold, %", [percent(np.mean(bands.get(kind, np.nan))) for kind in KINDS]
     )
-    shares = ", ".join(f"{name} {percent(np.mean(each), 1)} %" for name, each in lost.items())
-    print(f"\nFrames called lost, of takes: {shares}.")
 
 
 if __name__ == "__main__":

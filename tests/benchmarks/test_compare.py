@@ -36,7 +36,7 @@ class Made:
 
 def test_a_process_lists_prepares_and_runs_jobs(worker):
     assert "fit_hops33" in worker.jobs
-    assert worker.ask("prepare clone_params") == {}
+    assert worker.ask("prepare paper64_walks") == {}
     assert 0 < worker.ask("run")["ms"] < 1000
     assert worker.ask("prepare nothing") == {"error": "KeyError: 'nothing'"}
     assert "is no request" in worker.ask("stop")["error"]
