@@ -154,18 +154,19 @@ class Expectation:
         self._belongs = np.zeros((len(between), len(parts)))
         for k, part in enumerate(parts):
             self._belongs[part.columns, k] = 1
-        self._blocks = [between[np.ix_(part.columns, part.columns)] for part in parts]
+        pairs = [np.ix_(part.columns, part.columns) for part in parts]
+        self._blocks = [(rows, columns, between[rows, columns]) for rows, columns in pairs]
         self._windows, scaled = windows, windows[:, :, np.newaxis] * self.scale
         weighted = over_time @ scaled
         self._alone = 1 / np.einsum("wpf,wpf->wf", scaled, weighted)
         self._inverse = []
-        for part, block in zip(parts, self._blocks, strict=True):
+        for part, (*_, block) in zip(parts, self._blocks, strict=True):
             products = scaled[..., part.columns].swapaxes(1, 2) @ weighted[..., part.columns]
             self._inverse.append(np.linalg.inv(products * block))
         self.lags = lags
         shifts = [(shifted(mean, lag) - mean) * self.scale for lag in lags]
         self._shifts = np.array(shifts).reshape(len(lags), *mean.shape)
-        self._shift_norms = np.array([self._norms(x) for x in self._shifts])
+        self._shift_norms = self._norms(self._shifts)
         self._swing = (mean - mean.mean(axis=0)) * self.scale
         self._swing_norms = self._norms(self._swing)
         self._whole_norm = np.sum(self._swing * (over_time @ self._swing @ between))
@@ -212,10 +213,13 @@ class Expectation:
         return 2 * change * whole - change**2 * self._whole_norm if change < -0.5 else 0.0
 
     def _norms(self, x):
-        products, pairs = x.T @ self.over_time @ x, zip(self.parts, self._blocks, strict=True)
-        return np.array(
-            [np.sum(products[np.ix_(part.columns, part.columns)] * block) for part, block in pairs]
-        )
+        """Squared norms (..., n_parts) of each part of deviations (..., K, n_columns)."""
+        products = x.swapaxes(-1, -2) @ self.over_time @ x
+        norms = [
+            (products[..., rows, columns] * block).sum(axis=(-2, -1))
+            for rows, columns, block in self._blocks
+        ]
+        return np.stack(norms, axis=-1)
 
 
 class FaultFinder:

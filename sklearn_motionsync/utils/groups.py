@@ -157,9 +157,8 @@ def encode_classes(y, trials, estimator_name):
 def sums_of_groups(values, codes):
     """Sums (n_groups, ...) of values (n, ...) by group, and the counts, of as many dimensions."""
     counts = np.bincount(codes)
-    sums = np.zeros((len(counts), *values.shape[1:]))
-    np.add.at(sums, codes, values)
-    return sums, counts.reshape(-1, *[1] * (values.ndim - 1))
+    sums = [values[codes == code].sum(axis=0) for code in range(len(counts))]
+    return np.array(sums, dtype=np.float64), counts.reshape(-1, *[1] * (values.ndim - 1))
 
 
 def mean_of_others(values, codes):
