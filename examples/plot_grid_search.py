@@ -14,7 +14,7 @@ from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, Direction
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, group_timing_error
 
-bunch = make_bending(24, n_frames=60, random_state=1)
+bunch = make_bending(16, n_frames=60, random_state=1)
 
 # %%
 # How probable new trials are
@@ -26,7 +26,7 @@ pipe = make_pipeline(
     DirectionCosines(bunch.skeleton), ASpace(6), DenseSynchronizer(n_frames=60), ActionModel()
 )
 grid = {
-    "densesynchronizer__smoothness": [0.0003, 0.003, 0.03],
+    "densesynchronizer__smoothness": [0.0003, 0.03],
     "densesynchronizer__max_offset": [0.05, 0.25],
 }
 search = GridSearchCV(pipe, grid, cv=GroupKFold(3)).fit(bunch.data, groups=bunch.actor)
@@ -40,7 +40,7 @@ search.best_params_
 # here, and shows whether the choice is right.
 
 poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-offsets = [0, 0.03, 0.06, 0.1, 0.15, 0.25, 0.4]
+offsets = [0, 0.03, 0.06, 0.12, 0.25]
 blind = GridSearchCV(
     DenseSynchronizer(n_frames=60), {"max_offset": offsets}, cv=2, scoring=FeatureHoldoutScorer()
 ).fit(poses)

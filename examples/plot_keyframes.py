@@ -90,9 +90,9 @@ display = SynchronizationDisplay.from_estimator(
 _ = display.figure_.suptitle("Lines and ticks are the heel strikes that were given")
 
 # %%
-# Eight sets
-# ----------
-# One set says little. Here are eight, with other people each. Heel strikes are given to all trials,
+# Five sets
+# ---------
+# One set says little. Here are five, with other people each. Heel strikes are given to all trials,
 # exact or soft, or to every fourth trial. The table judges by toe-offs and by the largest knee
 # flexion, which were never given.
 
@@ -110,7 +110,7 @@ ways = {
     "exact labels": lambda labels: (labels, 0),
 }
 rows = []
-for number in range(8):
+for number in range(5):
     walks, true = record_walks(number, **different)
     strikes = true.filter(like="heel strike")
     for way, choose in ways.items():

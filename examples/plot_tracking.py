@@ -16,7 +16,7 @@ from sklearn_motionsync.live import MotionTracker
 
 RATE, NOISE = 30, 0.05
 known = make_bending(16, n_frames=80, n_actors=8, style=2, frame_rate=RATE, random_state=0)
-new = make_bending(8, n_frames=80, n_actors=8, style=2, frame_rate=RATE, random_state=7)
+new = make_bending(5, n_frames=80, n_actors=5, style=2, frame_rate=RATE, random_state=7)
 cosines = DirectionCosines(known.skeleton).fit(known.data)
 names = list(cosines.get_feature_names_out())
 limbs = np.array([name.rpartition("_")[0] for name in names])
@@ -27,7 +27,7 @@ tracker.fit(X, groups=known.actor)
 # %%
 # Half of the limbs, for a second
 # -------------------------------
-# Eight new people bend. Both arms and the left leg are hidden for a second; the rest is seen with
+# Five new people bend. Both arms and the left leg are hidden for a second; the rest is seen with
 # noise.
 
 hidden = ["left_arm", "left_forearm", "right_arm", "right_forearm", "left_thigh", "left_leg"]
@@ -46,7 +46,7 @@ filtered, smoothed = tracker.track(seen), tracker.smooth(seen)
 # The filter uses the past only, and works while the movement runs. The smoother uses the whole
 # take, and repairs a recording. Two simple repairs are compared: the last pose is kept, or the
 # gap is filled with straight lines. The error is the angle between true and estimated limbs, over
-# all eight people. These people are synthetic; real people differ more, and errors are larger.
+# all five people. These people are synthetic; real people differ more, and errors are larger.
 
 
 def degrees(poses, true):

@@ -55,11 +55,11 @@ print(compare_groups(pipe, other.data, other.group, groups=other.person).describ
 # %%
 # Where it fails
 # --------------
-# If strides count as people, p is far too small. In these six sets nothing differs:
+# If strides count as people, p is far too small. In these four sets nothing differs:
 
 called = {"by people": 0, "by strides": 0}
-for seed in range(6):
-    same = make_gait(16, n_cycles=4, random_state=seed)
+for seed in range(4):
+    same = make_gait(12, n_cycles=4, random_state=seed)
     sync = DenseSynchronizer(101).fit(same.data)
     for way, people in zip(called, (same.person, None), strict=True):
         found = compare_groups(sync, same.data, same.group, groups=people, n_permutations=199)
