@@ -42,6 +42,7 @@ def test_people_are_accepted_and_another_action_scores_lower(bends, hdm05):
     assert pipe.score_samples(others).max() < pipe.score_samples(bends.data).min()
 
 
+@pytest.mark.nightly
 def test_dense_beats_linear_on_held_out_actors(bends):
     """Synchronised trials of new people are more probable under the model."""
     given = {"groups": bends.actor, "cv": GroupKFold(4)}

@@ -147,9 +147,10 @@ def test_table_fits_the_other_functions(walk):
     DenseSynchronizer(50).fit(strides, keyframes=keyframes)
 
 
-def test_nothing_of_people_that_stand(ruler, real_data, capsys):
+@pytest.mark.parametrize("every", [63, pytest.param(21, marks=pytest.mark.nightly)])
+def test_nothing_of_people_that_stand(every, ruler, real_data, capsys):
     """Standing, sitting down and squatting have no strikes; only a lunge has steps."""
-    ruler.refused(real_data, every=21)
+    ruler.refused(real_data, every)
     _, _, *lines = capsys.readouterr().out.strip().splitlines()
     assert len(lines) == 6
     for line in lines:

@@ -42,24 +42,28 @@ def read_with_warnings(path):
     return df, [str(warning.message) for warning in caught]
 
 
-@pytest.mark.parametrize("n_points", [1, 40])
-@pytest.mark.parametrize(
-    ("stated", "message"),
-    [
-        # Documented ways: the words of the trial, floats, and LONG_FRAMES.
-        ({"FRAMES": words(65535), "trial": actual(1, MANY)}, None),
-        ({"FRAMES": floats(MANY)}, None),
-        ({"FRAMES": words(65535), "LONG_FRAMES": floats(MANY)}, None),
-        ({"FRAMES": words(MANY), "LONG_FRAMES": floats(MANY), "wrapped": True}, None),
-        ({"FRAMES": words(-1), "trial": actual(500, MANY + 499), "first": 500}, None),
-        # The data alone tell.
-        ({"FRAMES": words(65535)}, "it says 65535 frames, and its data hold 70000, which are read"),
-        ({"FRAMES": words(MANY), "wrapped": True}, "it says 4464 frames, and its data hold 70000"),
-        ({"FRAMES": None, "wrapped": True, "first": 65000}, "it says 4464 frames, and its"),
-        ({"FRAMES": words(65535), "wrapped": True}, "it says 4464 or 65535 frames, and its data"),
-        ({"FRAMES": floats(69_000), "trial": actual(1, MANY)}, "it says 69000 or 70000 frames"),
-    ],
-)
+# What the header states, and what is warned of.
+DOCUMENTED = [
+    # The words of the trial, floats, and LONG_FRAMES.
+    ({"FRAMES": words(65535), "trial": actual(1, MANY)}, None),
+    ({"FRAMES": floats(MANY)}, None),
+    ({"FRAMES": words(65535), "LONG_FRAMES": floats(MANY)}, None),
+    ({"FRAMES": words(MANY), "LONG_FRAMES": floats(MANY), "wrapped": True}, None),
+    ({"FRAMES": words(-1), "trial": actual(500, MANY + 499), "first": 500}, None),
+]
+FROM_THE_DATA = [
+    ({"FRAMES": words(65535)}, "it says 65535 frames, and its data hold 70000, which are read"),
+    ({"FRAMES": words(MANY), "wrapped": True}, "it says 4464 frames, and its data hold 70000"),
+    ({"FRAMES": None, "wrapped": True, "first": 65000}, "it says 4464 frames, and its"),
+    ({"FRAMES": words(65535), "wrapped": True}, "it says 4464 or 65535 frames, and its data"),
+    ({"FRAMES": floats(69_000), "trial": actual(1, MANY)}, "it says 69000 or 70000 frames"),
+]
+# A frame of 40 points is longer than what may fill the last block; its number is exact.
+CASES = [(1, *case) for case in DOCUMENTED + FROM_THE_DATA]
+CASES += [(40, *case) for case in FROM_THE_DATA]
+
+
+@pytest.mark.parametrize(("n_points", "stated", "message"), CASES)
 def test_no_frame_beyond_16_bits_is_lost(tmp_path, n_points, stated, message):
     df, said = read_with_warnings(put(tmp_path, long_file(n_points, **stated), "a.c3d"))
     np.testing.assert_array_equal(df["M0_x"], np.arange(MANY))

@@ -80,6 +80,7 @@ def test_intervals_hold_the_made_truth_of_new_people(fitted, clips, truths, as_m
         assert 0.85 <= held(found, truths[1::2]) <= 0.99
 
 
+@pytest.mark.nightly
 def test_phases_and_intervals_of_real_people_held_out(hdm05):
     """The truth is the warp of the whole clip. Under another action nothing is sure."""
     action, other = "grabHighR", "depositFloorR"

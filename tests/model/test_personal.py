@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionDetector, ActionModel, ASpace, DenseSynchronizer, Match
+from sklearn_motionsync import (
+    ActionDetector,
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    Match,
+)
 from sklearn_motionsync.model.similarity import PersonalReference
 from test_similarity import slow_ratio, slow_threshold, slow_weights
 from test_variation import slow_within
@@ -125,9 +132,10 @@ def test_a_detector_takes_a_reference_as_it_was_recorded():
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.TrialWarning")
 def test_exercises_of_people_done_right_and_wrong(benchmark, real_data):
     """A person held out; shoulder rotation, where people differ more than right from wrong."""
-    read = benchmark("exercises").read_exercises(real_data)
-    (found,) = [rest for name, *rest in read if name == "shoulder rotation"]
-    poses, people, correct, takes = found
+    markers, table, skeleton = benchmark("exercises").read_positions(real_data)
+    rows = table[table["label"] == "shoulder rotation"]
+    poses = DirectionCosines(skeleton).fit_transform([markers[i] for i in rows.index])
+    people, correct, takes = (rows[name].to_numpy() for name in ("actor", "correct", "take"))
     train = np.flatnonzero((people != "s03") & correct & (takes % 2 == 1))
     mine = np.flatnonzero(people == "s03")
     right, rest = mine[correct[mine]][:3], np.setdiff1d(mine, mine[correct[mine]][:3])

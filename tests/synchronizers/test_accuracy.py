@@ -121,7 +121,16 @@ def times_of():
     return times
 
 
-@pytest.mark.parametrize("event", EVENTS, ids=lambda e: "-".join((*e[:2], *e[3:])))
+# The bends by default; what takes warps of its own is left to the night.
+@pytest.mark.parametrize(
+    "event",
+    [
+        pytest.param(event, id="-".join((*event[:2], *event[3:])), marks=marks)
+        for event, marks in zip(
+            EVENTS, [(), pytest.mark.nightly, (), pytest.mark.nightly], strict=True
+        )
+    ],
+)
 def test_key_moment_errors_of_real_people(event, hdm05, times_of):
     action, joint, extreme = event[:3]
     (peer_mean, peer_median), (share, most), settings = EVENTS[event]

@@ -156,6 +156,7 @@ def test_coverage_of_known_warps_of_one_source(noise, n_features, known_warps):
     assert np.median(widths) < 2 * {0.005: 0.06, 0.05: 0.4}[noise]
 
 
+@pytest.mark.nightly
 def test_coverage_of_people_held_out(real_data, benchmark):
     """Key moments of people that had no part in the fit; constants are those of the package."""
     harness = benchmark("harness")
