@@ -174,11 +174,11 @@ class Body:
 
     def _check_lengths(self, largest, called):
         """Refuse limbs without length; those that are not there have length 0."""
-        lengths, skeleton = self.lengths, self._skeleton
+        lengths, skeleton, limbs = self.lengths, self._skeleton, self._skeleton.limbs
         # A shorter limb is rounding of the largest coordinate.
         zero = lengths <= np.finfo(lengths.dtype).eps * largest
         for k, name in enumerate(LIMB_NAMES):
-            if name not in skeleton.limbs:
+            if name not in limbs:
                 lengths[:, k], zero[:, k] = 0, False
             elif skeleton.n_dims == 2 and name in LATERAL_LIMBS:
                 end_on = zero[:, k].copy()

@@ -58,7 +58,8 @@ _UNIT_TOLERANCE = 0.05
 
 def limbs_between(landmarks):
     """Names of the limbs both of whose joints are among the landmarks."""
-    return [name for name, limb in LIMBS.items() if {limb.start, limb.end} <= set(landmarks)]
+    known = set(landmarks)
+    return [name for name, limb in LIMBS.items() if limb.start in known and limb.end in known]
 
 
 def limb_indices(limbs):
