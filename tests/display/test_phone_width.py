@@ -116,7 +116,7 @@ DRAWN = {
 @pytest.mark.parametrize("kind", DRAWN)
 def test_new_figures_are_narrow_and_show_all_their_text(pipe, poses, kind):
     figure = DRAWN[kind](pipe, poses).figure_
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     assert figure.get_size_inches()[0] <= LARGEST_WIDTH
     axes = [axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)]
     # Matplotlib keeps tick labels beyond the limits of an axis, and does not draw them.
