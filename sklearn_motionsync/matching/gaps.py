@@ -55,12 +55,14 @@ def interpolate_gaps(values, longest=np.inf, times=None, held=False, straight=Fa
     """
     out = values.astype(np.float64)
     hidden = np.isnan(out)
-    gappy = np.flatnonzero(hidden.any(axis=0) & ~hidden.all(axis=0))
     times = np.arange(len(out)) if times is None else times
-    masks, of_mask = np.unique(hidden[:, gappy], axis=1, return_inverse=True)
-    for k, mask in enumerate(masks.T):
-        columns, rows, seen = gappy[of_mask.ravel() == k], np.flatnonzero(mask), ~mask
-        at = np.flatnonzero(seen)
+    # Columns that are hidden in the same frames, such as those of a joint.
+    alike = {}
+    for k in np.flatnonzero(hidden.any(axis=0) & ~hidden.all(axis=0)):
+        alike.setdefault(hidden[:, k].tobytes(), []).append(k)
+    for columns in alike.values():
+        mask = hidden[:, columns[0]]
+        rows, at = np.flatnonzero(mask), np.flatnonzero(~mask)
         after = np.searchsorted(at, rows)
         if held and times[at[0]] - times[0] <= longest:
             out[np.ix_(rows[after == 0], columns)] = out[at[0], columns]
