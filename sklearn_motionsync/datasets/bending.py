@@ -202,10 +202,8 @@ def _vary(random_state, style, angles):
 def _animate(phase, lengths, angles):
     """Joint positions (n_frames, 15, 3) of a body facing z, feet on the floor."""
     moments = [0, *_KEYFRAMES.values(), 1]
-    angle = {
-        name: np.deg2rad(PchipInterpolator(moments, values)(phase))
-        for name, values in angles.items()
-    }
+    curves = PchipInterpolator(moments, np.column_stack([*angles.values()]))(phase)
+    angle = dict(zip(angles, np.deg2rad(curves.T.copy()), strict=True))
     hip = np.array([lengths["hip"] / 2, 0, 0]) * np.ones((len(phase), 1))
     ankle = {"left": hip, "right": -hip}
     at = {}
