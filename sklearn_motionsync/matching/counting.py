@@ -31,8 +31,10 @@ def whole(values, way="nearest"):
     -------
     int, or ndarray of int
     """
-    halves = np.round(2 * np.asarray(values, dtype=np.float64)) / 2
-    values = np.where(np.isclose(values, halves, ROUNDING, _NEAR), halves, values)
+    values = np.asarray(values, dtype=np.float64)
+    halves = np.round(2 * values) / 2
+    is_near = np.abs(values - halves) <= _NEAR + ROUNDING * np.abs(halves)
+    values = np.where(is_near, halves, values)
     numbers = np.ceil(values) if way == "up" else np.floor(values + 0.5 * (way == "nearest"))
     return numbers.astype(np.intp) if numbers.ndim else int(numbers)
 
