@@ -1,11 +1,23 @@
 """What all tests and documented examples share: figures are closed, files go to a folder."""
 
+import gc
 import os
 import sys
 
 import pytest
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+def pytest_collection():
+    """Nothing of what is collected is garbage."""
+    gc.disable()
+
+
+def pytest_collection_finish():
+    """What is collected stays until the end, so that no search for garbage needs to look at it."""
+    gc.enable()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)
