@@ -1,7 +1,7 @@
 """Cycles of real people: their period against foot geometry, and where a recording repeats.
 
     python benchmarks/cycles.py DATA_FOLDER [periods] [single] [several] [standing]
-        [joined] [gestures]
+        [counts] [joined] [gestures]
 
 *Periods*: a foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such
 a maximum stands out by 0.3 of the whole swing. A step is the time from one strike to the next, of
@@ -17,8 +17,12 @@ that are warned of are false alarms.
 behind. ``freeze`` repeats the first and the last frame. ``sway`` turns within half a second to a
 pose of standing and back, and sways by 1 cm, below about 1 Hz, with 1 mm of noise. ``noise`` has
 1 cm of white noise in all joints as well. A cycle is inside if it begins and ends within the walk;
-a cut is inside alike. *Joined* are single actions, with a jog in the middle. A *gesture* in a long
-take is found if more than half of a stretch lies within its label. Prints Markdown.
+a cut is inside alike. *Counts*: three, five or eight repetitions of a person, done right, are
+joined, ten frames between them, and a segmenter that learnt from other people counts them.
+Exercises of UI-PRMD and jumping jacks of Kinder-Gator, which stand around and are counted by the
+wrists, were looked at when the numbers of the decoder were chosen, those of IntelliRehabDS were
+not. *Joined* are single actions, with a jog in the middle. A *gesture* in a long take is found if
+more than half of a stretch lies within its label. Prints Markdown.
 """
 
 import copy
@@ -26,9 +30,11 @@ import functools
 from pathlib import Path
 
 import numpy as np
+from exercises import read_positions, read_rehabilitation
 from harness import at_frames, command_line, print_head, print_row, run_tables, vertex
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
+from sklearn_motionsync import DirectionCosines
 from sklearn_motionsync.datasets import load_trials
 from sklearn_motionsync.takes import CycleSegmenter
 
@@ -48,6 +54,8 @@ SMOOTHING, APART = 0.02, 0.3
 # Of so many repetitions in a chain every so many is one done wrong; 0 is none.
 CHAIN, EVERY, DRAWS = 12, (0, 2, 4), 3
 GESTURES = ("waveHands", "clapHands")
+# Repetitions of a take that is joined, and frames from one to the next.
+COUNTS, BETWEEN = (3, 5, 8), 10
 # Seconds of the turn to a pose of standing, and of the filter of the sway; sway and noise in m.
 TURN, SLOW, SWAY, NOISE = 0.5, 0.25, 0.01, 0.001
 
@@ -332,6 +340,58 @@ def gestures(folder):
     yield "elsewhere in takes", sum(map(len, stretches)) - len(right) + others
 
 
+# -- counts -----------------------------------------------------------------------------
+
+
+def repetitions(trials, table):
+    """Of every exercise: its name, joined takes, their people, and their counts."""
+    right = table["correct"] & np.array([np.isfinite(x).all() for x in trials])
+    for name, rows in table[right].groupby("label"):
+        takes, people, counts, rng = [], [], [], np.random.default_rng(0)
+        for person, own in rows.groupby("actor").groups.items():
+            for count in COUNTS:
+                if len(own) >= count:
+                    chosen = [trials[i] for i in rng.choice(own, count, replace=False)]
+                    parts = [chosen[0]]
+                    for x in chosen[1:]:
+                        turn = blended(parts[-1][-1][np.newaxis], x[:1], BETWEEN)
+                        parts += [turn[:-1, 0], x]
+                    takes.append(np.concatenate(parts))
+                    people.append(person)
+                    counts.append(count)
+        yield name, takes, np.array(people), np.array(counts)
+
+
+def jumping_jacks(folder):
+    """Takes, people, and how often both wrists are highest."""
+    bunch = load_trials(Path(folder) / "kinder_gator" / "kinder_gator_even.npz")
+    wanted = np.flatnonzero(np.asarray(bunch.target) == "Do-two-jumping-jacks")
+    wrists = [list(bunch.joints).index(f"Wrist{side}") for side in ("Left", "Right")]
+    takes, counts = [bunch.data[i] for i in wanted], []
+    for x in takes:
+        heights = gaussian_filter1d(x.reshape(len(x), -1, 3)[:, wrists, 1].mean(axis=1), 1.5)
+        peaks, _ = find_peaks(heights, prominence=0.35 * np.ptp(heights), distance=8)
+        counts.append(len(peaks))
+    takes = DirectionCosines(bunch.skeleton).fit_transform(takes)
+    return takes, np.asarray(bunch.actor)[wanted], np.array(counts)
+
+
+def counted(takes, people, counts):
+    """Of takes: how many; counted right by a segmenter that knows other people, and by its report
+    to the nearest whole number; repetitions that are found, and that are there.
+    """
+    whole, spans = np.zeros((2, len(takes)))
+    for fold in np.array_split(np.unique(people), 5):
+        held = np.isin(people, fold)
+        known = [x for x, left_out in zip(takes, held, strict=True) if not left_out]
+        segmenter = CycleSegmenter(not_cyclic="skip").fit(known)
+        for i in np.flatnonzero(held):
+            whole[i] = len(segmenter.segment([takes[i]])[0])
+            spans[i] = segmenter.report([takes[i]])["n_cycles"].iloc[0]
+    right = [(whole == counts).sum(), (np.round(spans) == counts).sum()]
+    return map(str, [len(takes), *right, int(whole.sum()), counts.sum()])
+
+
 # -- tables -----------------------------------------------------------------------------
 
 
@@ -378,6 +438,17 @@ def standing_table(folder):
         print_row(name, map(str, standing(every, factor, kind, rate)))
 
 
+def count_table(folder):
+    head = ["takes", "counted right", "by the report", "repetitions found", "there"]
+    print_head("counts", head)
+    print_row("jumping jacks", counted(*jumping_jacks(folder)))
+    for read_trials in (read_positions, read_rehabilitation):
+        trials, table, skeleton = read_trials(folder)
+        trials = DirectionCosines(skeleton, hidden="nan").fit_transform(trials)
+        for name, *takes in repetitions(trials, table):
+            print_row(name, counted(*takes))
+
+
 def joined_table(folder):
     print_head("joined single actions", ["takes", "cyclic", "jog found", "other stretches"])
     for n_actions in (2, 3, 4, 5):
@@ -397,6 +468,7 @@ TABLES = {
     "single": single_table,
     "several": several_table,
     "standing": standing_table,
+    "counts": count_table,
     "joined": joined_table,
     "gestures": gesture_table,
 }

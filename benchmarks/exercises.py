@@ -155,15 +155,20 @@ OTHER_ARM = {"shoulder abduction left": ("202",)}
 N_LEARNT, N_TESTED, N_FOLDS = 40, 120, 5
 
 
-def patients(folder):
-    """Of every exercise: the area under the curve, right ones accepted, wrong ones found."""
-    path = folder / "irds" / "irds_left_positions.npz"
+def read_rehabilitation(folder):
+    """Joints of IntelliRehabDS, the table of trials, and the skeleton; turned as above."""
+    path = Path(folder) / "irds" / "irds_left_positions.npz"
     with np.load(path) as file:
         table = pd.DataFrame({k: file[k] for k in ("label", "actor", "correct", "patient")})
     # Joints that were lost are zeros.
     trials = [np.where(x == 0, np.nan, x) for x in load_trials(path).data]
     skeleton = Skeleton.kinect_v2()
-    trials = turned(trials, table, OTHER_ARM, skeleton)
+    return turned(trials, table, OTHER_ARM, skeleton), table, skeleton
+
+
+def patients(folder):
+    """Of every exercise: the area under the curve, right ones accepted, wrong ones found."""
+    trials, table, skeleton = read_rehabilitation(folder)
     trials = DirectionCosines(skeleton, hidden="nan").fit_transform(trials)
     print_head("IntelliRehabDS", ["area", "healthy accepted", "patients accepted", "found"])
     judged = []

@@ -36,23 +36,24 @@ _ = display.figure_.suptitle("Each cycle of a new person is cut\nwhere the hip i
 # How well the cuts agree
 # -----------------------
 # All cuts should be at the same moment of the cycle. The figure shows the true moment of each cut,
-# as its distance from the median. With ``refine=False`` the cuts follow a constant period. They
-# drift, because the pace changes from cycle to cycle.
+# as its distance from the median. Cuts that follow the first one at a constant period, that of the
+# self-correlation, drift, because the pace changes from cycle to cycle.
 
 
-def places_of_cuts(segmenter):
-    """The true moments of the cuts, in per cent of a cycle from their median."""
-    _, origin = segmenter.segment(new)
-    starts, stops = (
-        list(zip(origin["take"], origin[name], strict=True)) for name in ("start", "stop")
-    )
-    cuts = sorted({*starts, *((take, min(stop, len(times[take]) - 1)) for take, stop in stops)})
-    phases = np.array([times[take][frame] % 1 for take, frame in cuts])
+def places_of_cuts(starts):
+    """The true moments of starts in takes, in per cent of a cycle from their median."""
+    phases = np.concatenate([times[take][frames] % 1 for take, frames in starts.items()])
     return 100 * ((phases - np.median(phases) + 0.5) % 1 - 0.5)
 
 
-steady = CycleSegmenter(start=0, refine=False).fit(takes[:3])
-cuts = {"constant period": places_of_cuts(steady), "dense matching": places_of_cuts(segmenter)}
+_, origin = segmenter.segment(new)
+starts = {take: rows["start"].to_numpy() for take, rows in origin.groupby("take")}
+periods = segmenter.report(new)["period"]
+steady = {
+    take: np.round(frames[0] + periods[take] * np.arange(len(frames))).astype(int)
+    for take, frames in starts.items()
+}
+cuts = {"constant period": places_of_cuts(steady), "dense matching": places_of_cuts(starts)}
 figure, axis = plt.subplots(figsize=(6.4, 2.6), layout="constrained")
 for row, (places, color) in enumerate(zip(cuts.values(), ("#D55E00", "#0072B2"), strict=True)):
     axis.plot(places, np.full(len(places), row), "o", color=color, alpha=0.6, markersize=9)

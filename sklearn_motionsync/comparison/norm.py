@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator
 
 from ..inputs.types import Features, Labels, TrialsLike, Unit
 from ..inputs.wording import counted
-from ..matching.counting import first_largest, runs_of, whole
+from ..matching.counting import ROUNDING, first_largest, runs_of, whole
 from ..model.acceptance import LEAST, LogMoments
 from ..model.variation import predictive_variance
 from ..synchronizers.match import UNITS, Match
@@ -449,7 +449,8 @@ def _verdicts(subjects, measures, of_norm, level):
     counts = [len(trials) for *_, trials in subjects]
     expected = {k: _Expected(of_norm, k) for k in set(counts)}
     p = np.array([expected[k].chances(x) for k, x in zip(counts, measures, strict=True)])
-    limits = np.array([expected[k].limits(level) for k in counts])
+    # A p that is the level but for rounding is at the level, and differs.
+    limits = (1 - ROUNDING) * np.array([expected[k].limits(level) for k in counts])
     columns = {"group": [group for _, group, _ in subjects], "n_trials": counts, "p": p[:, 0]}
     columns |= {"p_shape": p[:, 1], "p_timing": p[:, 2]}
     columns["differs"] = (measures > limits).any(axis=1)

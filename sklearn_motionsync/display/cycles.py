@@ -120,9 +120,10 @@ class CycleDisplay(Display):
         fitted = hasattr(estimator, "pattern_")
         segmenter = CycleSegmenter(**estimator.get_params()).set_params(not_cyclic="skip")
         recordings, takes = check_takes(segmenter, X, reset=True)
+        facts = TrialFacts.of([recordings[0]], frame_rate)
         (x,), (repeats,) = correlate_takes(segmenter, recordings[:1], takes[:1])
         longest = (as_learnt(estimator, x, repeats) if fitted else repeats).correlation
-        row = segmenter.report(recordings[:1]).iloc[0]
+        row = estimator.report(recordings[:1]).iloc[0]
         segmenter.set_params(start=estimator.start_ if fitted else estimator.start)
         name, curve = _curve_of(segmenter, recordings[0], x)
         cuts, cycles = np.array([], dtype=int), ""
@@ -131,7 +132,6 @@ class CycleDisplay(Display):
             whole = origin[origin["complete"]]
             cuts = np.unique([whole["start"], whole["stop"] - 1])
             cycles = counted(len(whole), "whole cycle")
-        facts = TrialFacts.of([recordings[0]], frame_rate)
         lasting = facts.durations() if unit == "seconds" else None
         (label,) = labels_of_signals([name], units_of_columns(recordings[0]), units)
         period = f"period {longest.period:.1f} frames" if row["period"] > 0 else ""

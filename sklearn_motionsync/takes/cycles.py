@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from itertools import chain
 from numbers import Integral, Real
 from typing import Any, Literal, Self
 
@@ -30,27 +31,26 @@ from ..matching.counting import ROUNDING, first_largest
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import FRAME_RATE, validated
 from .cutting import as_takes, cut_takes
-from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
-from .stretches import (
-    FOLLOWS,
+from .decoder import (
+    AS_LONG,
     PHASES,
-    SampledStretch,
     Stretch,
-    average_cycle,
     circular_peak,
-    constant_phases,
-    find_repeats,
-    locate_cycles,
-    match_phases,
+    cut_cycles,
+    follow,
+    learn_cycle,
+    mean_of,
     move_to_events,
-    similarity,
-    summary_of,
+    period_of,
+    slowest_near,
 )
+from .repetitions import Repetition, find_repeats, summary_of
+from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
 
-# A fit matches the takes to the pattern, and estimates it again, so many times.
+# A fit follows the pattern in the takes, and estimates it again, so many times.
 _ROUNDS = 2
-# Cycles are as long as the learnt ones up to the first ratio, and the same up to the second.
-_AS_LONG, _SAME = 1.25, 1.001
+# Cycles are the same up to this ratio.
+_SAME = 1.001
 # Cycles are warned of outside these shares of the period of their take. Right cuts of walks, jogs
 # and exercises lasted 0.68 to 1.31 of it, and those through several repetitions more than 1.5.
 _SHORT, _LONG = 0.6, 1.5
@@ -74,18 +74,20 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
     A take is one recording of several repetitions. A cycle is one repetition: it becomes one trial
     (trial).
 
-    1. Stretches are the parts of a take in which it repeats. Standing, turning, starting and
-       stopping are in none. `self_correlation` of a stretch gives its period. A take with a stretch
-       is cyclic.
-    2. The pattern of one cycle is the mean of the cycles of all stretches at constant period.
-    3. Dense matching aligns every stretch with the pattern, repeated periodically: a path may
-       begin and end at any phase. The pattern is averaged again, twice.
-    4. The pattern begins where a foot is farthest ahead, in gait, or where a feature is largest.
+    1. Where a take repeats, `self_correlation` gives its period. A take that does is cyclic.
+    2. The pattern of one cycle is the mean of the cycles of all takes, first at constant period,
+       then matched.
+    3. Every frame of a take is rest, another movement, or the cycle at some phase. Dynamic
+       programming finds the cheapest path (`decoder`): its stretches of the cycle are the parts of
+       the take that are cut. Standing, turning and other movements are in none. The pattern is
+       averaged again over them, twice; so a take that repeats too seldom by itself teaches, too.
+    4. The pattern begins where a foot is farthest ahead, in gait; where the movement rests or
+       turns; or where a feature is largest.
     5. Stretches are cut where their phase is a whole number.
 
-    What is in no stretch is left out. So are the pieces of a stretch before the first cut and after
-    the last one, and cycles that do not follow the pattern; ``incomplete=True`` returns these. A
-    piece can hold almost a whole repetition.
+    The first and the last repetition of a stretch are whole if at most 2 % of the movement of the
+    pattern is missing at an end, by the energy of its velocities; 5 % if cycles begin where the
+    movement rests or turns. Shorter pieces are left out; ``incomplete=True`` returns them.
 
     Takes that are segmented later are aligned with the pattern of ``fit``, so all are cut at the
     same phase. A take gives several trials, hence `segment` and no ``transform``.
@@ -96,29 +98,29 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         Skeleton of joint positions: then directions of limbs are compared, independent of path and
         heading, and the positions are cut as they are. None compares the features themselves, each
         weighted by its variance.
-    start : {"left", "right", "ahead", "left strike", "right strike"}, str or int, default=None
+    start : {"left", "right", "ahead", "left strike", "rest"}, str or int, default=None
         Where cycles begin. With a skeleton ``"left"`` or ``"right"``: where that ankle is farthest
         ahead of the pelvis, some hundredths of a second before the foot strikes; ``"ahead"``: the
         same for the foot that comes farther; ``"left strike"`` or ``"right strike"``: where that
-        foot strikes, by `gait_events`, which needs the frame rate. Or a compared feature, by name
-        or index: where it is largest. In pictures, where y runs down, the y of a hip is largest
-        where the hip is lowest; change its sign to cut where the hip is highest. None is
-        ``"ahead"`` for gait: the skeleton has feet in space, and in the mean cycle their places
-        ahead of the pelvis, left less right, change by at least 0.15 leg lengths. For other
-        movements it is the feature that repeats best: see ``start_``.
+        foot strikes, by `gait_events`, which needs the frame rate. ``"rest"``: where the movement
+        turns, of several such phases where the pose is most like those at the ends of stretches. Or
+        a compared feature, by name or index: where it is largest. In pictures, where y runs down,
+        the y of a hip is largest where the hip is lowest; change its sign to cut where the hip is
+        highest. None is ``"ahead"`` for gait: the skeleton has feet in space, and in the mean cycle
+        their places ahead of the pelvis, left less right, change by at least 0.15 leg lengths. For
+        other movements it is ``"rest"``; for those that never turn, in which no squared velocity
+        falls below a fourth of the mean, it is the feature that repeats best: see ``start_``.
     threshold : float, default=0.4
         The self-correlation from which a stretch is cyclic, from 0 to 1. The limit is higher where
         chance correlations are larger: for movements in few directions (``breadth`` of
         `self_correlation`) up to ``(1 + 2 threshold) / 3`` for a single feature; below two cycles
         it is divided by ``sqrt(n_cycles - 1)``; and if the take moves in other places, too.
-    refine : bool, default=True
-        Whether stretches are matched to the pattern; False cuts at their constant mean period.
     incomplete : bool, default=False
         Whether to return the pieces of a stretch before its first and after its last whole cycle,
         and cycles that do not follow the pattern, too. They are trials with ``complete`` False in
         the table of `segment`. False leaves them out.
     not_cyclic : {"raise", "skip"}, default="raise"
-        What to do with a take without a stretch of at least 1.6 cycles.
+        What to do with a take in which nothing follows the pattern.
     period : (float, float), default=None
         Least and largest number of frames of a cycle, for takes in which several cycles fit: a step
         and two, where every second one is stronger. None takes the shortest of those that repeat
@@ -133,10 +135,10 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         The mean cycle from its start on: poses less the mean of their take, and velocities, each
         divided by its root mean square.
     start_ : str
-        What begins a cycle: ``"left"``, ``"right"``, ``"left strike"``, ``"right strike"``, or the
-        name of a feature.
+        What begins a cycle: ``"left"``, ``"right"``, ``"left strike"``, ``"right strike"``,
+        ``"rest"``, or the name of a feature.
     periods_ : ndarray, shape (n_takes,)
-        Frames of a cycle of each take, in its longest stretch; NaN for takes that were skipped.
+        Median frames of a cycle of each take; NaN for takes that were skipped.
     n_features_in_ : int
         Features of a frame.
     feature_names_in_ : ndarray of str
@@ -151,10 +153,10 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
     -----
     Gaps (NaN) are refused: fill them before, as by `io.fill_gaps`.
 
-    A cycle lasts at least half the mean period of its stretch. The pace may change slowly, by a
-    fifth and more. Fit takes of different movements separately, as they have no common pattern;
-    stretches that do not follow it are left out. Scale features of different units before, with
-    ``FrameWise(StandardScaler())``.
+    A cycle lasts at least half the period of its take. A rest of more than about two periods parts
+    two stretches; a shorter one lengthens the cycle that it is in. Fit takes of different movements
+    separately, as they have no common pattern, and a movement of one side of the body for each
+    side. Scale features of different units before, with ``FrameWise(StandardScaler())``.
 
     Examples
     --------
@@ -166,16 +168,15 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
     >>> len(cycles), cycles[0].shape[1]
     (5, 4)
     >>> locations[["take", "start", "stop"]].iloc[0].tolist()
-    [0, 18, 119]
-    >>> segmenter.report([bunch.data[3], bunch.data[3][:155]])["reason"].tolist()
-    ['', 'holds 1.55 cycles']
+    [0, 19, 119]
+    >>> segmenter.report([bunch.data[3], bunch.data[3][:155]])["n_cycles"].round(1).tolist()
+    [5.5, 1.5]
     """
 
     _parameter_constraints: dict = {
         "skeleton": [Skeleton, None],
         "start": [str, Integral, None],
         "threshold": [Interval(Real, 0, 1, closed="both")],
-        "refine": ["boolean"],
         "incomplete": ["boolean"],
         "not_cyclic": [StrOptions({"raise", "skip"})],
         "period": [tuple, list, np.ndarray, None],
@@ -187,7 +188,6 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         skeleton: Skeleton | None = None,
         start: str | int | None = None,
         threshold: float = 0.4,
-        refine: bool = True,
         incomplete: bool = False,
         not_cyclic: Literal["raise", "skip"] = "raise",
         period: Sequence[float] | np.ndarray | None = None,
@@ -196,7 +196,6 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         self.skeleton = skeleton
         self.start = start
         self.threshold = threshold
-        self.refine = refine
         self.incomplete = incomplete
         self.not_cyclic = not_cyclic
         self.period = period
@@ -231,51 +230,34 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         with self._progress(fits=True) as progress:
             step = progress.stage("correlating takes", len(takes))
             features, repeats = correlate_takes(self, collection, takes, step)
-            cyclic = self._select_cyclic(takes, repeats)
-            if not cyclic:
+            followed: list[list[Stretch]] = [[] for _ in takes]
+            learnt = learn_cycle(features, repeats, progress)
+            for _ in range(_ROUNDS if learnt else 0):
+                step = progress.stage("following the pattern", len(takes))
+                followed = []
+                for x, of_take in zip(features, repeats, strict=True):
+                    followed.append(follow(x, of_take.stretches, *learnt))
+                    step()
+                learnt = mean_of(followed), learnt[1]
+            self._check_cyclic(takes, repeats, followed)
+            if not any(followed):
                 n = len(takes)
                 none = "The take is not" if n == 1 else f"None of the {n} takes is"
                 raise ValueError(
                     f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
                 )
-            stretches = [(i, stretch) for i in cyclic for stretch in repeats[i].stretches]
-            sampled = [SampledStretch(features[i], stretch) for i, stretch in stretches]
-            phases = self._learn_phases(sampled, progress)
-            pattern = average_cycle([t.values for t in sampled], phases)
-            follow = [
-                k
-                for k, (t, p) in enumerate(zip(sampled, phases, strict=True))
-                if similarity(pattern, t, p) >= FOLLOWS
-            ]
-            if 0 < len(follow) < len(stretches):
-                # The others show another movement.
-                stretches = [stretches[k] for k in follow]
-                sampled = [sampled[k] for k in follow]
-                phases = self._learn_phases(sampled, progress)
-            cyclic = sorted({i for i, _ in stretches})
-            takes_of = [cyclic.index(i) for i, _ in stretches]
-            if strikes is not None:
-                frames = [strikes[i] for i, _ in stretches]
-                name, start = self.start, _phase_of(self.start, frames, sampled, phases)
-            else:
-                curves = start_curves(
-                    self, [collection[i] for i in cyclic], [features[i] for i in cyclic]
-                )
-                name, start = self._find_start(curves, sampled, takes_of, phases)
-            pattern = average_cycle([t.values for t in sampled], [p - start for p in phases])
-            periods = np.full(len(takes), np.nan)
-            for i in cyclic:
-                summary = summary_of([stretch for k, stretch in stretches if k == i])
-                periods[i] = summary.correlation.period
-        self.start_, self.pattern_, self.periods_ = name, pattern, periods
+            name, start = self._find_start(collection, features, followed, strikes)
+        self.start_, self.periods_ = name, np.array([period_of(each) for each in followed])
+        self.pattern_ = mean_of(followed, start)
         return self
 
     def segment(self, X: TrialsLike) -> tuple[list[Any], pd.DataFrame]:
         """Cut takes into cycles.
 
         Every cycle begins at the phase that `start` defines: about the frame where a foot is
-        farthest ahead, or where the feature is largest. What precedes the first such frame of a
-        stretch, and what follows the last one, is left out; ``incomplete=True`` returns it, too.
+        farthest ahead, where the movement rests, or where the feature is largest. What precedes the
+        first such frame of a stretch, and what follows the last one, is left out unless it is a
+        whole cycle but for a rest; ``incomplete=True`` returns it, too.
 
         Parameters
         ----------
@@ -294,8 +276,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
             the number of the stretch in the take, from 0; ``start`` and ``stop``, frames of the
             take, ``stop`` excluded; ``complete``, whether it is a whole cycle that follows the
             pattern; ``score``, its cosine similarity to the pattern, at most 1. A cycle follows
-            the pattern from a score of 0.5 on. The first and the last cycle of a stretch also move
-            at 0.85 of its speed where they begin and end, if the take goes on there.
+            the pattern from a score of 0.5 on.
 
         Raises
         ------
@@ -312,15 +293,16 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         check_is_fitted(self, "pattern_")
         collection, takes = check_takes(self, X, reset=False)
         rows, periods = [], []
-        for i, number, stretch, sampled, phases in self._phases(collection, takes):
-            cycles = locate_cycles(sampled, phases, self.pattern_, self.incomplete)
-            cycles_of_stretch = [(i, number, *row) for row in cycles]
-            rows += cycles_of_stretch
+        followed, repeats = self._follow(collection, takes)
+        self._check_cyclic(takes, repeats, followed)
+        for i, stretches in enumerate(followed):
             # Where several cycles fit there was a warning of that.
-            correlation = stretch.correlation
-            periods += [correlation.period if len(correlation.periods) == 1 else np.nan] * len(
-                cycles_of_stretch
-            )
+            several = len(repeats[i].correlation.periods) > 1
+            for number, stretch in enumerate(stretches):
+                pieces = cut_cycles(stretch, self.pattern_)
+                pieces = [piece for piece in pieces if piece.complete or self.incomplete]
+                rows += [(i, number, *piece) for piece in pieces]
+                periods += [np.nan if several else period_of(stretches)] * len(pieces)
         table = pd.DataFrame(rows, columns=list(_COLUMNS)).astype(_COLUMNS)
         # Whole cycles that are far longer or far shorter than the period of their stretch.
         shares = ((table["stop"] - 1 - table["start"]) / np.array(periods))[table["complete"]]
@@ -343,7 +325,10 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         return cut_takes(collection, takes, table)
 
     def report(self, X: TrialsLike) -> pd.DataFrame:
-        """Whether takes are cyclic, and where, by their self-correlation; no fit is needed.
+        """Whether takes are cyclic, and where: what `segment` will cut.
+
+        No fit is needed. Without one a take is judged by its self-correlation alone; after one,
+        stretches and the number of cycles are those that follow the pattern.
 
         Parameters
         ----------
@@ -354,41 +339,67 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         -------
         DataFrame
             One row a take, indexed by its label: ``n_frames``; ``period``, frames of a cycle, NaN
-            without any; ``n_cycles``, of all stretches; ``strength``, the self-correlation at the
-            period; ``cyclic``, whether it can be segmented; the ``reason`` why not; ``periods``, of
-            all cycles that fit; and ``stretches``, a list of their first frames and of the frames
-            after their last ones. Period, strength and periods are those of the longest stretch, or
-            of the take if it has none.
+            without any; ``n_cycles``, of all stretches, with fractions; ``strength``, the
+            self-correlation at the period; ``cyclic``, whether it can be segmented; the ``reason``
+            why not; ``periods``, of all cycles that fit; and ``stretches``, a list of their first
+            frames and of the frames after their last ones. Period, strength and periods are those
+            of the longest stretch in which the take repeats by itself, or of the take if there is
+            none.
         """
         self._validate_params()
-        collection, takes = check_takes(clone(self), X, reset=True)
+        fitted = hasattr(self, "pattern_")
+        collection, takes = check_takes(self if fitted else clone(self), X, reset=not fitted)
+        if fitted:
+            followed, repeats = self._follow(collection, takes)
+        else:
+            repeats = correlate_takes(self, collection, takes)[1]
         rows = []
-        for x, (stretches, correlation, reason) in zip(
-            takes, correlate_takes(self, collection, takes)[1], strict=True
-        ):
-            measures = correlation.period, correlation.n_cycles, correlation.strength
+        for i, (stretches, correlation, reason) in enumerate(repeats):
+            n_cycles = correlation.n_cycles
             ends = [(stretch.start, stretch.stop) for stretch in stretches]
-            rows.append((len(x), *measures, not reason, reason, correlation.periods.tolist(), ends))
+            if fitted:
+                ends = [stretch.ends for stretch in followed[i]]
+                n_cycles = sum(stretch.n_cycles for stretch in followed[i])
+                reason = "" if ends else reason or "does not follow the pattern"
+            measures = correlation.period, n_cycles, correlation.strength
+            fits = correlation.periods.tolist()
+            rows.append((len(takes[i]), *measures, not reason, reason, fits, ends))
         columns = ["n_frames", "period", "n_cycles", "strength", "cyclic", "reason", "periods"]
         columns.append("stretches")
         index = pd.Index(takes.labels, tupleize_cols=False, name="take")
         return pd.DataFrame(rows, columns=columns, index=index)
 
-    def _select_cyclic(self, takes, repeats):
-        """Indices of the takes that are cyclic; an error if others are not to be skipped."""
-        cyclic = [i for i, (_, _, reason) in enumerate(repeats) if not reason]
-        if len(cyclic) < len(takes) and self.not_cyclic == "raise":
-            i, (_, best, reason) = next((i, r) for i, r in enumerate(repeats) if r.reason)
+    def _follow(self, collection, takes):
+        """What of takes follows the learnt cycle, a list for each, and what repeats in them."""
+        features, repeats = correlate_takes(self, collection, takes)
+        repeats = [as_learnt(self, x, each) for x, each in zip(features, repeats, strict=True)]
+        period = float(np.nanmedian(self.periods_))
+        followed = [
+            follow(x, each.stretches, self.pattern_, period)
+            for x, each in zip(features, repeats, strict=True)
+        ]
+        if self.start_ in STRIKES:
+            followed = [
+                [move_to_events(stretch, of_foot) for stretch in stretches]
+                for stretches, of_foot in zip(followed, strikes_of(self, collection), strict=True)
+            ]
+        return followed, repeats
+
+    def _check_cyclic(self, takes, repeats, followed):
+        """An error if a take, or all of them, follow no cycle; a warning if several cycles fit."""
+        missing = [i for i, stretches in enumerate(followed) if not stretches]
+        if missing and self.not_cyclic == "raise":
+            i, (_, best, reason) = missing[0], repeats[missing[0]]
             within = "" if self.period is None else f" within period={self.period}"
             raise ValueError(
-                f"{takes.called(i)}: {reason}{within}. Its self-correlation is "
-                f"{best.strength:.2f} at {best.n_cycles:.2f} cycles; "
+                f"{takes.called(i)}: {reason or 'does not follow the pattern'}{within}. Its "
+                f"self-correlation is {best.strength:.2f} at {best.n_cycles:.2f} cycles; "
                 f"threshold={self.threshold:g} and at least {LEAST_CYCLES} cycles are required. "
                 'Leave it out, give a longer take, or set not_cyclic="skip"; see report(X).'
             )
         several = {
             i: stretch.correlation
-            for i in reversed(cyclic)
+            for i in reversed(range(len(takes)))
             for stretch in repeats[i].stretches
             if len(stretch.correlation.periods) > 1
         }
@@ -403,68 +414,35 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
                 UserWarning,
                 stacklevel=4,
             )
-        return cyclic
 
-    def _phases(self, collection, takes):
-        """Yield, for every stretch of every cyclic take, what is known of it.
-
-        Index of the take, number of the stretch in it, the stretch, its samples, and their phases.
-        """
-        features, repeats = correlate_takes(self, collection, takes)
-        repeats = [as_learnt(self, x, f) for x, f in zip(features, repeats, strict=True)]
-        align = match_phases if self.refine else constant_phases
-        strikes = strikes_of(self, collection) if self.start_ in STRIKES else None
-        for i in self._select_cyclic(takes, repeats):
-            for number, stretch in enumerate(repeats[i].stretches):
-                sampled = SampledStretch(features[i], stretch)
-                phases = align(self.pattern_, sampled)
-                if strikes is not None:
-                    phases = move_to_events(sampled.times, phases, strikes[i])
-                yield i, number, stretch, sampled, phases
-
-    def _learn_phases(self, sampled, progress):
-        """Phases of takes without a pattern: at constant pace one by one, then matched."""
-        values, phases = [take.values for take in sampled], []
-        for k, take in enumerate(sampled):
-            phases.append(
-                constant_phases(average_cycle(values[:k], phases), take) if k else take.mean_phases
-            )
-        rounds = _ROUNDS if self.refine else 0
-        step = progress.stage("matching takes", rounds * len(sampled))
-        for _ in range(rounds):
-            pattern, phases = average_cycle(values, phases), []
-            for take in sampled:
-                phases.append(match_phases(pattern, take))
-                step()
-        return phases
-
-    def _find_start(self, curves, sampled, takes_of, phases):
+    def _find_start(self, collection, features, followed, strikes):
         """The name of what begins a cycle, and its phase in the pattern."""
-        cycles = {
-            name: average_cycle(
-                [
-                    stretch.sample(of_all[k][stretch.inside, np.newaxis])
-                    for stretch, k in zip(sampled, takes_of, strict=True)
-                ],
-                phases,
-            )[:, 0]
-            for name, of_all in (curves or {}).items()
-        }
+        if strikes is not None:
+            return self.start, _phase_of(self.start, strikes, followed)
+        curves = start_curves(self, collection, features) or {}
+        cycles = {name: mean_of(followed, curves=of_all)[:, 0] for name, of_all in curves.items()}
         # In gait the feet step, by their places ahead of the pelvis.
-        if not cycles or (
-            self.start is None and np.ptp(cycles[SIDES[0]] - cycles[SIDES[1]]) < LEAST_STEP
+        if cycles and (
+            self.start is not None or np.ptp(cycles[SIDES[0]] - cycles[SIDES[1]]) >= LEAST_STEP
         ):
-            width = sampled[0].values.shape[1] // 2
-            values = [take.values[:, :width] for take in sampled]
-            mean = average_cycle(values, phases)
-            repeats = np.square(mean).mean(axis=0)
-            moves = np.square(np.concatenate(values)).mean(axis=0)
-            # What moves less is rounding.
-            moves = np.where(moves > ROUNDING * moves.max(), moves, np.inf)
-            best = first_largest(repeats / moves)
-            return compared_names(self)[best], circular_peak(mean[:, best]) / PHASES
-        name = list(cycles)[first_largest([cycle.max() for cycle in cycles.values()])]
-        return name, circular_peak(cycles[name]) / PHASES
+            name = list(cycles)[first_largest([cycle.max() for cycle in cycles.values()])]
+            return name, circular_peak(cycles[name]) / PHASES
+        pattern = mean_of(followed)
+        poses = pattern[:, : pattern.shape[1] // 2]
+        values = [stretch.values for stretch in chain(*followed)]
+        slowest = slowest_near(pattern, np.mean([each[[0, -1]] for each in values], axis=(0, 1)))
+        if slowest is not None:
+            return "rest", slowest / PHASES
+        if self.start == "rest":
+            raise ValueError(
+                "start='rest', but the movement never turns or rests: give a feature, or None."
+            )
+        repeats = np.square(poses).mean(axis=0)
+        moves = np.square(np.concatenate(values)[:, : poses.shape[1]]).mean(axis=0)
+        # What moves less is rounding.
+        moves = np.where(moves > ROUNDING * moves.max(), moves, np.inf)
+        best = first_largest(repeats / moves)
+        return compared_names(self)[best], circular_peak(poses[:, best]) / PHASES
 
 
 # -- takes, and what is compared of them --------------------------------------------------
@@ -515,13 +493,13 @@ def as_learnt(segmenter, features, repeats):
     learnt, stretches = segmenter.periods_, []
     for stretch in repeats.stretches:
         fits = stretch.correlation.periods
-        near = (fits >= np.nanmin(learnt) / _AS_LONG) & (fits <= np.nanmax(learnt) * _AS_LONG)
+        near = (fits >= np.nanmin(learnt) / AS_LONG) & (fits <= np.nanmax(learnt) * AS_LONG)
         if len(fits) > 1 and near.sum() == 1:
             (period,) = fits[near]
             inside = features[stretch.start : stretch.stop]
             chosen = correlate(inside, (period / _SAME, period * _SAME))
             if not rejection_reason(chosen, segmenter.threshold):
-                stretches.append(Stretch(stretch.start, stretch.stop, chosen))
+                stretches.append(Repetition(stretch.start, stretch.stop, chosen))
                 continue
         stretches.append(stretch)
     return summary_of(stretches) if stretches else repeats
@@ -547,7 +525,7 @@ def start_curves(segmenter, X, features):
         and bool({"hip", "shoulder"} & set(skeleton.limbs))
         and {"pelvis", "left_ankle", "right_ankle"} <= set(skeleton.landmarks)
     )
-    if start is None and not has_feet:
+    if start == "rest" or (start is None and not has_feet):
         return None
     start = STRIKES.get(start, start)
     if start in (None, "ahead") or (start in SIDES and skeleton is not None):
@@ -583,18 +561,14 @@ def strikes_of(segmenter, X):
     return strikes
 
 
-def _phase_of(start, strikes, sampled, phases):
+def _phase_of(start, strikes, followed):
     """The phase at which feet strike, in the mean of stretches."""
-    at = [
-        np.interp(
-            strikes_of_take[
-                (strikes_of_take >= take.times[0]) & (strikes_of_take <= take.times[-1])
-            ],
-            take.times,
-            of_take,
-        )
-        for strikes_of_take, take, of_take in zip(strikes, sampled, phases, strict=True)
-    ]
+    at = []
+    for of_foot, stretches in zip(strikes, followed, strict=True):
+        for stretch in stretches:
+            times = stretch.times
+            inside = of_foot[(of_foot >= times[0]) & (of_foot <= times[-1])]
+            at.append(np.interp(inside, times, stretch.phases))
     at = np.concatenate(at)
     if not len(at):
         raise ValueError(f"No {start} is found where the takes repeat; look at gait_events(X).")

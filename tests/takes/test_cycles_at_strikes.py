@@ -6,7 +6,6 @@ import pytest
 from sklearn_motionsync.datasets import load_trials, make_walk
 from sklearn_motionsync.gait import gait_events
 from sklearn_motionsync.takes import CycleSegmenter
-from sklearn_motionsync.takes.stretches import move_to_events
 
 WALK = make_walk(4, n_strides=6, random_state=0)
 
@@ -50,18 +49,6 @@ def test_cuts_of_recorded_walks(real_data):
     for take, start in zip(table["take"], table["start"], strict=True):
         known = strikes(bunch.data[6 + take], bunch.skeleton, "Left", 60)
         assert np.abs(known - start).min() <= 0.5
-
-
-def test_events_far_from_a_beginning_do_not_count():
-    times, phases = np.arange(101.0), np.arange(101) / 25
-    moved = move_to_events(times, phases, np.array([27.0, 40.0, 74.0]))
-    np.testing.assert_allclose(moved[[27, 74]], [1, 3], atol=1e-9)
-    assert (np.diff(moved) >= 0).all()
-    same = move_to_events(times, phases, np.array([40.0]))
-    np.testing.assert_array_equal(same, phases)
-    # Of two near one beginning none is sure.
-    same = move_to_events(times, phases, np.array([24.0, 27.0]))
-    np.testing.assert_array_equal(same, phases)
 
 
 def test_refused():

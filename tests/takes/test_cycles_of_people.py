@@ -5,7 +5,7 @@ import pytest
 from sklearn.model_selection import GroupKFold
 from sklearn_motionsync.takes import CycleSegmenter
 from sklearn_motionsync.takes.cycles import correlate_takes
-from sklearn_motionsync.takes.stretches import SampledStretch, match_phases
+from sklearn_motionsync.takes.decoder import follow
 
 
 @pytest.fixture(scope="module")
@@ -66,12 +66,11 @@ def phases_of_others(bunch):
         segmenter = CycleSegmenter(bunch.skeleton, start="right")
         segmenter.fit([bunch.data[i] for i in train])
         takes = [bunch.data[i] for i in test]
+        period = np.nanmedian(segmenter.periods_)
         for i, x, repeats in zip(test, *correlate_takes(segmenter, takes, takes), strict=True):
-            for stretch in repeats.stretches:
-                sampled = SampledStretch(x, stretch)
-                phases = match_phases(segmenter.pattern_, sampled)
-                inside = np.arange(stretch.start, stretch.stop)
-                out[i][inside] = np.interp(inside, sampled.times, phases)
+            for stretch in follow(x, repeats.stretches, segmenter.pattern_, period):
+                inside = np.arange(*stretch.ends)
+                out[i][inside] = np.interp(inside, stretch.times, stretch.phases)
     return out
 
 

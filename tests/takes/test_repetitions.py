@@ -1,11 +1,11 @@
-"""Stretches: where in takes of known movement they repeat."""
+"""Where in takes of known movement they repeat."""
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync.display import CycleDisplay
 from sklearn_motionsync.takes import CycleSegmenter
-from sklearn_motionsync.takes.stretches import find_repeats
+from sklearn_motionsync.takes.repetitions import find_repeats
 
 
 def waves(n_frames, period, first=0):
@@ -44,7 +44,7 @@ def test_several_stretches_are_numbered_and_counted_on():
     cycles, table = segmenter.segment([x])
     whole = table[table["complete"]]
     assert whole["stretch"].unique().tolist() == [0, 1]
-    assert whole["stretch"].value_counts().tolist() in ([5, 3], [4, 3], [5, 4])
+    assert whole["stretch"].value_counts().tolist() == [6, 3]
     ends = table.groupby("stretch").agg({"start": "min", "stop": "max"})
     np.testing.assert_allclose(ends, [[150, 390], [540, 840]], rtol=0, atol=8)
     assert [len(x) for x in cycles] == (table["stop"] - table["start"]).tolist()
@@ -63,8 +63,9 @@ def test_only_what_follows_the_pattern_is_complete():
     segmenter = CycleSegmenter(start=0, incomplete=True).fit(X)
     assert len(places(x)) == 2
     table = segmenter.segment([x])[1]
-    assert table.loc[table["complete"], "stretch"].unique().tolist() == [0]
-    assert table.loc[table["stretch"] == 1, "score"].max() < 0.5
+    assert table["stretch"].unique().tolist() == [0]
+    assert table["stop"].max() < 430
+    assert segmenter.report([x])["n_cycles"][0] == pytest.approx(7, abs=0.1)
     alone = CycleSegmenter(start=0).fit([x[: places(x)[0][1]], X[1]])
     assert np.vdot(segmenter.pattern_, alone.pattern_) > 0.99 * np.square(alone.pattern_).sum()
     np.testing.assert_allclose(segmenter.periods_, 60, rtol=0.01)
