@@ -1,9 +1,9 @@
 """Cycles of real people: their period against foot geometry, and where a recording repeats.
 
-    python benchmarks/cycles.py DATA_FOLDER [periods] [single] [several] [standing]
+    python benchmarks/cycles.py DATA_FOLDER [single] [several] [standing]
         [counts] [joined] [gestures]
 
-*Periods*: a foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such
+A foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such
 a maximum stands out by 0.3 of the whole swing. A step is the time from one strike to the next, of
 either foot. A period is held against twice the median step: the jogs begin from standing, and their
 first stride is longer. *Single* actions are not to be cyclic.
@@ -395,17 +395,6 @@ def counted(takes, people, counts):
 # -- tables -----------------------------------------------------------------------------
 
 
-def period_table(folder):
-    for archive, label in CYCLIC.items():
-        bunch = read(folder, archive, label)
-        report = CycleSegmenter(bunch.skeleton).report(bunch.data)
-        print_head(label, ["period", "cycles", "error, %"])
-        pairs = zip(bunch.data, bunch.frame_rate, report.itertuples(), strict=True)
-        for k, (x, rate, row) in enumerate(pairs):
-            error = 100 * (row.period / period_of_strikes(x, bunch.skeleton, rate) - 1)
-            print_row(k, [f"{row.period:.1f}", f"{row.n_cycles:.2f}", f"{error:.1f}"])
-
-
 def single_table(folder):
     print_head("not to be cyclic", ["takes", "called cyclic", "highest strength"])
     for archive, labels in SINGLE.items():
@@ -464,7 +453,6 @@ def gesture_table(folder):
 
 
 TABLES = {
-    "periods": period_table,
     "single": single_table,
     "several": several_table,
     "standing": standing_table,

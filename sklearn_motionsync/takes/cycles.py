@@ -44,8 +44,14 @@ from .decoder import (
     period_of,
     slowest_near,
 )
-from .repetitions import Repetition, find_repeats, summary_of
-from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
+from .self_correlation import (
+    LEAST_CYCLES,
+    Repetition,
+    correlate,
+    find_repeats,
+    rejection_reason,
+    summary_of,
+)
 
 # A fit follows the pattern in the takes, and estimates it again, so many times.
 _ROUNDS = 2

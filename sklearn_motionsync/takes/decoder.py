@@ -32,8 +32,8 @@ AS_LONG = 1.25
 FOLLOWS = 0.5
 # Stretches hold so many cycles at least.
 _LEAST = 0.9
-# A piece at an end of a stretch is a whole cycle if it lacks no more of the movement of the pattern:
-# if cycles begin where it turns, and if they begin where it moves.
+# A piece at an end of a stretch is a whole cycle if it lacks no more of the pattern's movement: if
+# cycles begin where it turns, and if they begin where it moves.
 _LACKS_AT_REST, _LACKS = 0.05, 0.02
 # The movement turns where the square of its velocity is below this share of the mean.
 _TURNS = 0.25

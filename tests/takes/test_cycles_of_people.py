@@ -143,16 +143,3 @@ def test_gestures_are_found(cycles, real_data):
     assert cyclic >= 0.9 * n_clips
     assert cyclic + found >= 0.8 * (n_clips + n_labels)
     assert others == 0
-
-
-def test_cycles_of_walks_between_standing_score_high(cycles, walks):
-    """The other frames of the take would score about 0.3."""
-    walk = next(w for w in walks if w["label"] == "walk")
-    others = [w["points"].reshape(len(w["points"]), -1) for w in walks if w["label"] == "walk"][1:]
-    take, (first, last) = cycles.with_standing(walk, 4, "sway", np.random.default_rng(0))
-    segmenter = CycleSegmenter(walk["skeleton"], start="left").fit(others)
-    table = segmenter.segment([take])[1]
-    assert len(table) >= 1
-    assert table["score"].min() > 0.9
-    assert table["start"].min() >= first - 1
-    assert table["stop"].max() <= last + 1

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync.display import CycleDisplay
 from sklearn_motionsync.takes import CycleSegmenter
-from sklearn_motionsync.takes.repetitions import find_repeats
+from sklearn_motionsync.takes.self_correlation import find_repeats
 
 
 def waves(n_frames, period, first=0):
