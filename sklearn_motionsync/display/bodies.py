@@ -111,7 +111,7 @@ def _fill_gaps(track, what):
         raise ValueError(
             f"No frame shows the {what}, so the place and the heading of the body are unknown."
         )
-    return interpolate_gaps(track, held=True, straight=True)
+    return interpolate_gaps(track, held=True, way="line")
 
 
 def project(x, skeleton, azimuth):

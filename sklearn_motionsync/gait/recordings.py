@@ -344,7 +344,7 @@ class Walk:
         filled = points.copy()
         for j in np.flatnonzero(hidden.any(axis=0)):
             ways = (points[:, j, np.newaxis] - points).reshape(len(points), -1)
-            ways = interpolate_gaps(ways, held=True, straight=True).reshape(points.shape)
+            ways = interpolate_gaps(ways, held=True, way="line").reshape(points.shape)
             rows = hidden[:, j]
             filled[rows, j] = nanmean((points + ways)[rows].swapaxes(0, 1), axis=0)
         return filled.mean(axis=1)
@@ -395,7 +395,7 @@ class Walk:
         return 1.0 if total >= 0 else -1.0
 
     def _unit(self, directions):
-        filled = interpolate_gaps(directions, held=True, straight=True)
+        filled = interpolate_gaps(directions, held=True, way="line")
         filled = smooth(filled[np.newaxis], _HEADING * self.rate)[0]
         size = np.linalg.norm(filled, axis=1, keepdims=True)
         return filled / np.where(size > 0, size, 1)

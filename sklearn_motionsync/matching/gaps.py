@@ -5,15 +5,18 @@ was seen of the trial: poses are taken to be normal, and correlated over time. S
 arm follows the other limbs, and joins smoothly what was seen before and after the gap. What remains
 unknown of a frame is a share of it, and its complement the weight of the frame in the trellis. So a
 short gap counts nearly like none, and a frame of which nothing is known counts nothing.
+
+A take that stands alone is filled by what its own frames tell, as far as they tell more than the
+frames beside a gap do.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator
+from scipy.interpolate import Akima1DInterpolator, CubicSpline
 from scipy.linalg import solveh_banded
 
-from .counting import runs_of
+from .counting import ROUNDING, runs_of, whole
 from .filters import SMOOTHING
 from .sizes import BATCH, CONSTANT
 
@@ -23,6 +26,13 @@ UNSEEN = 0.3
 # Noise of the features by which others are predicted, as a share of their variance: few people have
 # shown them together (docs/design.md).
 SHRINKAGE = 0.2
+# Penalties of the regressions in a take, as shares of the mean variance of seen positions; in how
+# many gaps each is tried; and the power of its error there that is its weight (docs/design.md).
+RIDGES = 1e-1, 1e-3, 1e-6
+TRIES, POWER = 10, -12
+# Frames beside a gap that a cubic spline goes by; those farther away do not change it.
+REACH = 10
+WAYS = {"line": None, "akima": Akima1DInterpolator, "cubic": CubicSpline}
 
 
 def is_gappy(values):
@@ -31,8 +41,8 @@ def is_gappy(values):
     return bool(np.isnan(values.sum()))
 
 
-def interpolate_gaps(values, longest=np.inf, times=None, held=False, straight=False):
-    """Values whose gaps are interpolated over time, by Akima's piecewise cubic polynomials.
+def interpolate_gaps(values, longest=np.inf, times=None, held=False, way="akima"):
+    """Values whose gaps are interpolated over time.
 
     Parameters
     ----------
@@ -45,8 +55,9 @@ def interpolate_gaps(values, longest=np.inf, times=None, held=False, straight=Fa
     held : bool, default=False
         Whether a column holds its first and last value in gaps that touch an end; otherwise these
         stay NaN.
-    straight : bool, default=False
-        Whether gaps are bridged by straight lines, which are nearer where gaps are long.
+    way : {"akima", "cubic", "line"}, default="akima"
+        By Akima's piecewise cubic polynomials, by a cubic spline, or by straight lines, which also
+        join fewer than three values.
 
     Returns
     -------
@@ -73,11 +84,11 @@ def interpolate_gaps(values, longest=np.inf, times=None, held=False, straight=Fa
         rows = rows[times[at[after]] - times[at[after - 1]] <= longest + 1]
         if len(rows):
             known, wanted = out[np.ix_(at, columns)], np.ix_(rows, columns)
-            if straight or len(at) < 3:
+            if way == "line" or len(at) < 3:
                 lines = [np.interp(times[rows], times[at], values) for values in known.T]
                 out[wanted] = np.column_stack(lines)
             else:
-                out[wanted] = Akima1DInterpolator(times[at], known)(times[rows])
+                out[wanted] = WAYS[way](times[at], known)(times[rows])
     return out
 
 
@@ -102,7 +113,7 @@ def fill_with_mean(trials, mean):
         return trials
     hidden, filled = np.isnan(trials), trials.copy()
     for i in np.flatnonzero(hidden.any(axis=(1, 2))):
-        deviations = np.nan_to_num(interpolate_gaps(trials[i] - mean, held=True, straight=True))
+        deviations = np.nan_to_num(interpolate_gaps(trials[i] - mean, held=True, way="line"))
         np.copyto(filled[i], mean + deviations, where=hidden[i], casting="same_kind")
     return filled
 
@@ -210,12 +221,7 @@ class Filler(NamedTuple):
         hidden = np.isnan(array)
         unknown = np.where(hidden, 0, 1 - confidence)
         bands = _time_precision(len(array), *self.times)
-        # The features of every gap, by its first frame and the one after its last.
-        gaps = {}
-        for column in np.flatnonzero(hidden.any(axis=0)).tolist():
-            for first, end in runs_of(hidden[:, column]).tolist():
-                gaps.setdefault((first, end), []).append(column)
-        for (first, end), columns in gaps.items():
+        for (first, end), columns in _gaps_of(hidden).items():
             unknown[first:end, columns] = _unknown_step(bands, first, end)
         for mask in np.unique(hidden[hidden.any(axis=1)], axis=0):
             rows = (hidden == mask).all(axis=1)
@@ -260,6 +266,130 @@ class Filler(NamedTuple):
                 pulls[rows], hidden[rows], self.precision, bands[:, rows]
             )
         return np.where(hidden, z * self.scale + self.mean, out)
+
+
+def fill_by_take(points, longest=np.inf, times=None):
+    """Positions whose gaps are filled by what the other frames of the same take tell.
+
+    Short gaps are filled first, and then count as seen.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n_frames, n_points, n_dims)
+        NaN where a point is hidden.
+    longest : float, default=inf
+        The longest gap that is filled, in frames.
+    times : ndarray, shape (n_frames,), default=None
+        Of the frames, in frames, increasing, if they are not evenly spaced.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_frames, n_points, n_dims)
+        Longer gaps, and those that touch an end, stay NaN.
+    """
+    times = np.arange(len(points)) if times is None else times
+    hidden = np.isnan(points).any(axis=2)
+    out = np.where(hidden[:, :, np.newaxis], np.nan, points)
+    # Where others are hidden at other times, lines are good enough to learn from.
+    bridged = interpolate_gaps(out.reshape(len(out), -1), times=times, held=True, way="line")
+    known, bridged = out.copy(), bridged.reshape(out.shape)
+    gaps = sorted(_gaps_of(hidden).items(), key=lambda gap: (gap[0][1] - gap[0][0], gap[0]))
+    for (first, end), chosen in gaps:
+        if first > 0 and end < len(out) and times[end] - times[first - 1] <= longest + 1:
+            others = bridged[:, ~np.isnan(out[first:end]).any(axis=(0, 2))]
+            wanted = known[:, chosen].reshape(len(out), -1)
+            filled = _fill_gap(wanted, others, first, end, times).reshape(
+                end - first, len(chosen), -1
+            )
+            out[first:end, chosen] = bridged[first:end, chosen] = filled
+    return out
+
+
+def _fill_gap(wanted, others, first, end, times):
+    """Columns (n_frames, n_columns), NaN where hidden, in a gap from the first frame to the end.
+
+    Other points (n_frames, n_points, n_dims) are seen in it. The columns are regressed on them,
+    both as they are and relative to the mean of the others. What a regression leaves is joined
+    across the gap in all ways, and so are the columns themselves. These guesses are averaged, with
+    weights that fall with their errors in gaps elsewhere in the take.
+    """
+    seen = ~np.isnan(wanted).any(axis=1)
+    middle = others.sum(axis=1) / max(others.shape[1], 1)
+    place = np.tile(middle, wanted.shape[1] // middle.shape[1])
+    regress = _regressions(wanted, others, seen)
+    regress_apart = _regressions(wanted - place, others - middle[:, np.newaxis], seen)
+
+    def guess(starts, length, times=None):
+        """All guesses (length, n_starts, n_guesses, n_columns) of gaps of this length."""
+        rows = np.arange(-REACH, length + REACH)[:, np.newaxis] + starts
+        known = wanted[np.clip(rows, 0, len(wanted) - 1)]
+        known[(rows < 0) | (rows >= len(wanted))] = np.nan
+        known[REACH : REACH + length] = np.nan
+        trends = []
+        for near in np.clip(rows, 0, len(wanted) - 1).T:
+            gone = near[REACH : REACH + length]
+            gone = gone[seen[gone]]
+            apart = [place[near] + x for x in regress_apart(near, gone)]
+            trends.append([0 * place[near], *regress(near, gone), *apart])
+        trends = np.transpose(trends, (2, 0, 1, 3))
+        rest = (known[:, :, np.newaxis] - trends).reshape(len(rows), -1)
+        joined = [interpolate_gaps(rest, times=times, way=way) for way in WAYS]
+        guesses = [x.reshape(trends.shape) + trends for x in joined]
+        return np.concatenate(guesses, axis=2)[REACH : REACH + length]
+
+    # As long as the gap, and half as long, with two frames on either side.
+    hidden, errors = np.cumsum(np.pad(~seen, (1, 0))), []
+    for length in sorted({end - first, (end - first + 1) // 2}):
+        starts = 2 + np.flatnonzero(hidden[length + 4 :] == hidden[: -length - 4])
+        if len(starts):
+            starts = starts[whole(np.linspace(0, len(starts) - 1, min(TRIES, len(starts))))]
+            truth = wanted[np.arange(length)[:, np.newaxis] + starts]
+            wrong = guess(starts, length) - truth[:, :, np.newaxis]
+            errors.extend(np.sqrt(np.square(wrong).mean(axis=(0, 3))))
+    if not errors:
+        return interpolate_gaps(wanted, times=times)[first:end]
+    logs = np.log(np.maximum(errors, ROUNDING * np.max(errors) or 1)).mean(axis=0)
+    weights = np.exp(POWER * (logs - logs.min()))
+    near = np.clip(np.arange(first - REACH, end + REACH), 0, len(times) - 1)
+    guesses = guess(np.array([first]), end - first, times[near])[:, 0]
+    return np.tensordot(guesses, weights / weights.sum(), (1, 0))
+
+
+def _regressions(wanted, others, seen):
+    """A function of rows and of frames to leave out: `wanted` there by all ridge regressions.
+
+    Both are centred; what is joined to the frames beside a gap needs no means.
+    """
+    wanted, others = wanted - wanted[seen].mean(axis=0), others.reshape(len(others), -1)
+    centred = others - others.mean(axis=0)
+    energy = np.square(centred[seen]).sum() or 1.0
+    # Penalties take next to nothing of a constant with the energy of all columns together.
+    poses = np.column_stack([centred, np.full(len(others), np.sqrt(energy / seen.sum()))])
+    values, axes = np.linalg.eigh(poses[seen].T @ poses[seen])
+    poses = poses @ axes
+    products, penalty = poses[seen].T @ wanted[seen], energy / len(values)
+
+    def predict(rows, left_out):
+        out, gone = [], poses[left_out]
+        for ridge in RIDGES:
+            inverse = 1 / (np.maximum(values, 0)[:, np.newaxis] + ridge * penalty)
+            slopes, spread = inverse * products, inverse * gone.T
+            # Woodbury's identity takes these frames out of the moments.
+            wrong = wanted[left_out] - gone @ slopes
+            slopes -= spread @ np.linalg.solve(np.eye(len(gone)) - gone @ spread, wrong)
+            out.append(poses[rows] @ slopes)
+        return out
+
+    return predict
+
+
+def _gaps_of(hidden):
+    """The columns of every gap in a mask (n_frames, n), by its first frame and the one after."""
+    gaps = {}
+    for column in np.flatnonzero(hidden.any(axis=0)).tolist():
+        for first, end in runs_of(hidden[:, column]).tolist():
+            gaps.setdefault((first, end), []).append(column)
+    return gaps
 
 
 def add_weights(arrays, weights):

@@ -3,10 +3,17 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.interpolate import Akima1DInterpolator, CubicSpline
 from sklearn_motionsync.matching import tile as module
 from sklearn_motionsync.matching.anchors import KeyframeColumns, add_ramps
 from sklearn_motionsync.matching.costs import COSTS, step_table
-from sklearn_motionsync.matching.gaps import SHRINKAGE, Filler, interpolate_gaps, moments_of_seen
+from sklearn_motionsync.matching.gaps import (
+    SHRINKAGE,
+    Filler,
+    fill_by_take,
+    interpolate_gaps,
+    moments_of_seen,
+)
 from sklearn_motionsync.matching.trellis import Trellis
 
 from oracle import known_paths, step_costs
@@ -225,9 +232,9 @@ def test_moments_have_no_negative_variance():
 # -- interpolation ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("straight", [False, True])
-def test_gaps_are_interpolated_column_by_column(straight):
-    """Against pandas, which calls SciPy's Akima polynomials, or NumPy's lines."""
+@pytest.mark.parametrize(("way", "method"), [("akima",) * 2, ("cubic",) * 2, ("line", "index")])
+def test_gaps_are_interpolated_column_by_column(way, method):
+    """Against pandas, which calls SciPy's polynomials, or NumPy's lines."""
     rng = np.random.default_rng(0)
     values = rng.standard_normal((60, 6)).cumsum(axis=0)
     values[rng.random(values.shape) < 0.4] = np.nan
@@ -237,13 +244,12 @@ def test_gaps_are_interpolated_column_by_column(straight):
     table = pd.DataFrame(values, index=times)
     expected = pd.DataFrame(index=times, columns=table.columns, dtype=float)
     for k in range(6):
-        straight_column = straight or table[k].count() < 3
-        way = "index" if straight_column else "akima"
-        column = table[k].interpolate(way, limit_area="inside") if table[k].count() else table[k]
+        by = method if table[k].count() > 2 else "index"
+        column = table[k].interpolate(by, limit_area="inside") if table[k].count() else table[k]
         expected[k] = column
-    filled = interpolate_gaps(values, times=times, straight=straight)
+    filled = interpolate_gaps(values, times=times, way=way)
     np.testing.assert_allclose(filled, expected, rtol=1e-12)
-    held = interpolate_gaps(values, times=times, held=True, straight=straight)
+    held = interpolate_gaps(values, times=times, held=True, way=way)
     np.testing.assert_allclose(held, expected.ffill().bfill(), rtol=1e-12)
     np.testing.assert_array_equal(values, before)
 
@@ -260,7 +266,7 @@ def test_longer_gaps_stay_hidden():
     # Frames that were dropped count.
     times = np.where(np.arange(20) < 5, 0, 1) + np.arange(20)
     assert np.isnan(interpolate_gaps(values, 2, times)[4:6, 0]).all()
-    filled = interpolate_gaps(values, 3, times, straight=True)
+    filled = interpolate_gaps(values, 3, times, way="line")
     np.testing.assert_allclose(filled[4:6, 0], [3 + 3 / 4, 3 + 9 / 4])
 
 
@@ -271,3 +277,112 @@ def test_ends_are_held_and_a_feature_never_seen_has_its_mean():
     gappy[:8, 0], gappy[:, 1] = np.nan, np.nan
     filled, _ = filler(gappy)
     np.testing.assert_allclose(filled, flat[0])
+
+
+# -- a take by its own frames ---------------------------------------------------------------
+
+
+def cut(points, *gaps):
+    """A copy of points (n_frames, n_points, n_dims) with gaps (first, end, points)."""
+    out = points.copy()
+    for first, end, chosen in gaps:
+        out[first:end, chosen] = np.nan
+    return out
+
+
+def walking(seed, n_frames=120, n_points=6, n_sources=3):
+    """Points that all follow a few smooth sources."""
+    rng = np.random.default_rng(seed)
+    sources = interpolate_gaps(
+        np.where(np.arange(n_frames)[:, None] % 6, np.nan, rng.normal(size=(n_frames, n_sources))),
+        held=True,
+        way="cubic",
+    )
+    return (sources @ rng.normal(size=(n_sources, 3 * n_points))).reshape(n_frames, n_points, 3)
+
+
+def guesses_slowly(points, chosen, others, first, end):
+    """By least squares with one row more for each penalty, and splines of the frames around."""
+    n, others = len(points), points[:, others]
+    middle, trends = others.mean(axis=1, keepdims=True), [np.zeros((n, 3 * len(chosen)))]
+    for place in (0 * middle, middle):
+        wanted = (points[:, chosen] - place).reshape(n, -1)
+        poses = (others - place).reshape(n, -1)
+        seen, poses = ~np.isnan(wanted).any(axis=1), poses - poses.mean(axis=0)
+        energy, wanted = np.square(poses[seen]).sum(), wanted - wanted[seen].mean(axis=0)
+        poses = np.column_stack([poses, np.full(n, np.sqrt(energy / seen.sum()))])
+        seen[first:end] = False
+        for ridge in (1e-1, 1e-3, 1e-6):
+            penalties = np.sqrt(ridge * energy / poses.shape[1]) * np.eye(poses.shape[1])
+            left = np.vstack([poses[seen], penalties])
+            right = np.vstack([wanted[seen], np.zeros((len(penalties), wanted.shape[1]))])
+            slopes = np.linalg.lstsq(left, right, rcond=None)[0]
+            trends.append(poses @ slopes + np.tile(place[:, 0], len(chosen)))
+    wanted, gap = points[:, chosen].reshape(n, -1), np.arange(first, end)
+    joins = [np.interp, lambda x, *known: Akima1DInterpolator(*known)(x)]
+    joins.append(lambda x, *known: CubicSpline(*known)(x))
+    guesses = np.empty((3, len(trends), len(gap), wanted.shape[1]))
+    for g, trend in enumerate(trends):
+        for c, rest in enumerate((wanted - trend).T):
+            near = [t for t in range(max(0, first - 10), min(n, end + 10)) if np.isfinite(rest[t])]
+            near = [t for t in near if t not in gap]
+            for way, join in enumerate(joins):
+                guesses[way, g, :, c] = trend[gap, c] + join(gap, near, rest[near])
+    return guesses.reshape(-1, len(gap), wanted.shape[1]), wanted
+
+
+def test_a_gap_is_the_mean_of_guesses_weighed_by_their_errors_elsewhere():
+    rng = np.random.default_rng(1)
+    points = walking(0, 60) + 0.3 * rng.normal(size=(60, 6, 3)).cumsum(axis=0)
+    gappy = cut(points, (20, 29, [1, 4]), (45, 46, [1]))
+    filled = fill_by_take(gappy)
+    errors, others = [], [0, 2, 3, 5]
+    seen = ~np.isnan(gappy[:, [1, 4]]).any(axis=(1, 2))
+    for length in (9, 5):
+        starts = [k for k in range(2, 59 - length) if seen[k - 2 : k + length + 2].all()]
+        for place in np.linspace(0, len(starts) - 1, 10):
+            k = starts[int(place + 0.5)]
+            guesses, wanted = guesses_slowly(gappy, [1, 4], others, k, k + length)
+            apart = guesses - wanted[k : k + length]
+            errors.append(np.sqrt(np.square(apart).mean(axis=(1, 2))))
+    weights = np.exp(np.log(errors).mean(axis=0)) ** -12.0
+    weights /= weights.sum()
+    guesses, _ = guesses_slowly(gappy, [1, 4], others, 20, 29)
+    expected = np.einsum("g,gtc->tc", weights, guesses)
+    assert np.sort(weights)[-3] > 0.05
+    np.testing.assert_allclose(filled[20:29, [1, 4]].reshape(9, -1), expected, rtol=1e-7)
+    np.testing.assert_array_equal(filled[~np.isnan(gappy)], gappy[~np.isnan(gappy)])
+
+
+def test_what_follows_the_other_points_is_filled_exactly():
+    points = walking(3)
+    gappy = cut(points, (30, 70, [0, 2]), (50, 58, [4]), (100, 103, [1]))
+    error = np.abs(fill_by_take(gappy) - points).max()
+    assert error < 2e-3 < 1 < np.abs(fill_by_take(gappy[:, [0]]) - points[:, [0]]).max()
+    moved = fill_by_take(1000 * gappy + 5e4) / 1000 - 50
+    np.testing.assert_allclose(moved, fill_by_take(gappy), atol=1e-7)
+
+
+def test_what_no_other_point_tells_is_left_to_the_line():
+    """Random walks, of which the line is what is expected."""
+    errors = {"filled": [], "line": []}
+    for seed in range(20):
+        points = np.random.default_rng(seed).normal(size=(200, 4, 3)).cumsum(axis=0)
+        gappy = cut(points, (90, 110, [1]))
+        line = interpolate_gaps(gappy.reshape(200, -1), way="line").reshape(points.shape)
+        for name, filled in (("filled", fill_by_take(gappy)), ("line", line)):
+            errors[name].append(np.square(filled - points).sum())
+    assert np.sum(errors["filled"]) < 1.05 * np.sum(errors["line"])
+
+
+def test_gaps_that_are_long_or_touch_an_end_stay_and_short_takes_are_interpolated():
+    points = walking(5)
+    gappy = cut(points, (0, 4, [1]), (40, 49, [2]), (60, 70, [3]), (115, 120, [1]), (0, 120, [5]))
+    hidden = np.isnan(fill_by_take(gappy, 9)).all(axis=2)
+    assert [np.flatnonzero(hidden[:, k]).size for k in range(6)] == [0, 9, 0, 10, 0, 120]
+    # A frame that was dropped counts.
+    times = np.arange(120) + (np.arange(120) > 43)
+    assert np.isnan(fill_by_take(gappy, 9, times)[40:49, 2]).all()
+    short = cut(points[:12], (3, 9, [0]))
+    by_itself = interpolate_gaps(short.reshape(12, -1)).reshape(short.shape)
+    np.testing.assert_array_equal(fill_by_take(short), by_itself)
