@@ -244,6 +244,8 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
                 for x, of_take in zip(features, repeats, strict=True):
                     followed.append(follow(x, of_take.stretches, *learnt))
                     step()
+                if not any(followed):
+                    break
                 learnt = mean_of(followed), learnt[1]
             self._check_cyclic(takes, repeats, followed)
             if not any(followed):

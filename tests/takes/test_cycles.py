@@ -269,6 +269,17 @@ def test_fit_refuses_takes_that_are_not_cyclic(gait):
         CycleSegmenter().fit(named[1:])
 
 
+def test_takes_of_as_many_movements_have_no_common_cycle():
+    """Each moves other features, so that none follows the mean of all."""
+    t = 2 * np.pi * np.arange(200) / 40
+    circle = np.column_stack([np.sin(t), np.cos(t)])
+    takes = [np.pad(circle, ((0, 0), (2 * k, 8 - 2 * k))) for k in range(5)]
+    with pytest.raises(ValueError, match="Trial 0: does not follow the pattern. Its self-corr"):
+        CycleSegmenter().fit(takes)
+    with pytest.raises(ValueError, match="None of the 5 takes is cyclic"):
+        CycleSegmenter(not_cyclic="skip").fit(takes)
+
+
 def test_a_take_of_few_cycles_teaches_with_the_others(gait):
     """It does not repeat often enough by itself, and follows the cycle of the others."""
     whole, other = gait.data[:2]
