@@ -77,16 +77,16 @@ STRIKES = {f"{side} strike": side for side in SIDES}
 class CycleSegmenter(LongWorkMixin, BaseEstimator):
     """Cut long takes of walking, running, or any movement that repeats, into its cycles.
 
-    A take is one recording of several repetitions. A cycle is one repetition: it becomes one trial
-    (trial).
+    A take is one recording of several repetitions. A cycle is one repetition, which becomes one
+    trial.
 
     1. Where a take repeats, `self_correlation` gives its period. A take that does is cyclic.
     2. The pattern of one cycle is the mean of the cycles of all takes, first at constant period,
        then matched.
     3. Every frame of a take is rest, another movement, or the cycle at some phase. Dynamic
-       programming finds the cheapest path (`decoder`): its stretches of the cycle are the parts of
-       the take that are cut. Standing, turning and other movements are in none. The pattern is
-       averaged again over them, twice; so a take that repeats too seldom by itself teaches, too.
+       programming finds the cheapest path. Its stretches of the cycle are the parts of the take
+       that are cut. Standing, turning and other movements are in none. The pattern is averaged
+       again over them, twice; so a take that repeats too seldom by itself teaches, too.
     4. The pattern begins where a foot is farthest ahead, in gait; where the movement rests or
        turns; or where a feature is largest.
     5. Stretches are cut where their phase is a whole number.
@@ -247,7 +247,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
                 if not any(followed):
                     break
                 learnt = mean_of(followed), learnt[1]
-            self._check_cyclic(takes, repeats, followed)
+            self._check_cyclic(takes, repeats, followed, stacklevel=4)
             if not any(followed):
                 n = len(takes)
                 none = "The take is not" if n == 1 else f"None of the {n} takes is"
@@ -302,7 +302,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         collection, takes = check_takes(self, X, reset=False)
         rows, periods = [], []
         followed, repeats = self._follow(collection, takes)
-        self._check_cyclic(takes, repeats, followed)
+        self._check_cyclic(takes, repeats, followed, stacklevel=3)
         for i, stretches in enumerate(followed):
             # Where several cycles fit there was a warning of that.
             several = len(repeats[i].correlation.periods) > 1
@@ -393,7 +393,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
             ]
         return followed, repeats
 
-    def _check_cyclic(self, takes, repeats, followed):
+    def _check_cyclic(self, takes, repeats, followed, stacklevel):
         """An error if a take, or all of them, follow no cycle; a warning if several cycles fit."""
         missing = [i for i, stretches in enumerate(followed) if not stretches]
         if missing and self.not_cyclic == "raise":
@@ -420,7 +420,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
                 "takes. Give period=(least, largest), in frames, to choose; report(X)['periods'] "
                 "lists what fits.",
                 UserWarning,
-                stacklevel=4,
+                stacklevel=stacklevel,
             )
 
     def _find_start(self, collection, features, followed, strikes):

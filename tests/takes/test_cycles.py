@@ -187,8 +187,11 @@ def test_of_several_cycles_that_fit_the_learnt_one_is_taken():
     slow = CycleSegmenter(start=0).fit([np.repeat(steady, 8, axis=0)])
     # Alone, much weaker steps would not make a take cyclic.
     for other, take in ((slow, beat), (segmenter, steps(0.15))):
-        with pytest.warns(UserWarning, match=r"several cycles fit, of .* 80\.\d is taken"):
+        with pytest.warns(
+            UserWarning, match=r"several cycles fit, of .* 80\.\d is taken"
+        ) as caught:
             other.segment([take])
+        assert caught[0].filename == __file__
 
 
 def squats(sizes):
