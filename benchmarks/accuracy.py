@@ -1,7 +1,7 @@
-"""How accurate: key moments of real people, known warps and true key-frames.
+"""How accurate: key moments of real people, and known warps.
 
     pip install . tslearn fdasrsf affinewarp
-    python benchmarks/accuracy.py DATA_FOLDER [people] [unseen] [known-warps] [bends] [peers]
+    python benchmarks/accuracy.py DATA_FOLDER [people] [unseen] [known-warps] [peers]
 
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form. *People*
 has the key moments of harness.py in three ways: of people held out, of all ordered pairs, and on
@@ -39,15 +39,11 @@ from harness import (
 )
 from joblib import Parallel, delayed
 from sklearn_motionsync import (
-    ASpace,
     DenseSynchronizer,
-    DirectionCosines,
     LinearSynchronizer,
 )
-from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.filters import SMOOTHING, smooth
 from sklearn_motionsync.matching.matcher import cost_features
-from sklearn_motionsync.metrics import group_timing_error, keyframe_error
 
 LINEAR, PAPER = "linear normalisation", "the paper's method"
 PLAIN, DEFAULTS = "`metric=None`", "`DenseSynchronizer()`"
@@ -198,36 +194,10 @@ def fed(align, kind, X):
     return align(smooth(on_clock, SMOOTHING * (P - 1)) if kind == "smoothed" else on_clock)
 
 
-# -- true key-frames --------------------------------------------------------------------
-
-
-def bending_table(folder):
-    """make_bending, four random sets: key-frames missed, and timing error without a pattern."""
-    given = "`LinearSynchronizer`, true key-frames"
-    print_head("make_bending", ["key-frames missed by", "timing error of the group"])
-    makers = {name: OURS[name] for name in (LINEAR, PAPER, DEFAULTS)}
-    makers |= {given: lambda: LinearSynchronizer(P)}
-    rows = {name: [] for name in makers}
-    for seed in range(4):
-        bunch = make_bending(random_state=seed)
-        poses = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-        X, lengths = ASpace().fit_transform(poses), [len(x) for x in bunch.data]
-        for name, make in makers.items():
-            known = {"keyframes": bunch.keyframes} if name == given else {}
-            sync = make().fit(X, **known)
-            times, n = sync.match(X, **known).times, sync.pattern_index_
-            pattern = bunch.keyframes[n] * (P - 1) / (lengths[n] - 1)
-            missed = keyframe_error(times, bunch.keyframes, pattern, lengths)
-            rows[name].append((missed, group_timing_error(times, bunch.times)))
-    for name, pairs in rows.items():
-        print_row(name, [f"{mean:.3f}" for mean in np.mean(pairs, axis=0)])
-
-
 TABLES = {
     "people": people_table,
     "unseen": unseen_table,
     "known-warps": known_table,
-    "bends": bending_table,
     "peers": peer_table,
 }
 

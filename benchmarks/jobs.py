@@ -44,7 +44,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.comparison import compare_groups, compare_to_norm
 from sklearn_motionsync.datasets import load_trials, make_bending
-from sklearn_motionsync.display import SkeletonDisplay, SynchronizationDisplay
+from sklearn_motionsync.display import SynchronizationDisplay
 from sklearn_motionsync.io import read_motion
 from sklearn_motionsync.live import MotionTracker, OnlineSynchronizer
 from sklearn_motionsync.model import find_departures
@@ -190,19 +190,15 @@ def of_all(estimator, X, method="transform"):
     return Work(partial(getattr(estimator.fit(X), method), X))
 
 
-def each(method, X, count=10):
-    """A method of one trial at a time, so many times."""
+def lone(estimator, X, method="transform"):
+    """A method of an estimator that is fitted to all, of one trial at a time, ten times."""
+    method = getattr(estimator.fit(X), method)
 
     def run():
-        for i in range(count):
+        for i in range(10):
             method(X[i : i + 1])
 
-    return Work(run, count)
-
-
-def lone(estimator, X, method="transform"):
-    """A method of an estimator that is fitted to all, of one trial at a time."""
-    return each(getattr(estimator.fit(X), method), X)
+    return Work(run, 10)
 
 
 def with_model():
@@ -304,11 +300,6 @@ def disp_sync(data):
     return drawn(lambda: SynchronizationDisplay.from_estimator(sync, data.hops_on_clock))
 
 
-def disp_skeleton(data):
-    bunch = data.simulated
-    return drawn(lambda: SkeletonDisplay.from_positions(bunch.data[0], skeleton=bunch.skeleton))
-
-
 def of_match(data, method):
     """A method of the match of the hops."""
     match = dense().fit(data.hops_on_clock).match(data.hops_on_clock)
@@ -359,7 +350,6 @@ JOBS = {
     "lone_1feature": lambda data: lone(dense(), data.hop_feature),
     "all_hops33": lambda data: of_all(dense(), data.hops_on_clock),
     "all_paper40": lambda data: of_all(paper(), data.walks),
-    "match_hops33": lambda data: of_all(dense(), data.hops_on_clock, "match"),
     "part_sync": part_sync,
     "linear_ft": lambda data: Work(lambda: LinearSynchronizer(P).fit_transform(data.hops_on_clock)),
     "keyframe_ft": keyframe_ft,
@@ -374,9 +364,6 @@ JOBS = {
     "detector_lone": lambda data: lone(detector(), data.hops_on_clock, "predict"),
     "clf_fit60": lambda data: fit(ActionClassifier, *three_actions(20, 0)),
     "clf_predict30": clf_predict30,
-    "clf_lone": lambda data: each(
-        ActionClassifier().fit(*three_actions(20, 0)).predict, warped_sines(5, seed=9), 5
-    ),
     "clf_reject_fit60": lambda data: fit(
         partial(ActionClassifier, reject_below="auto"), *three_actions(20, 0)
     ),
@@ -401,11 +388,7 @@ JOBS = {
     "cycles_fit": lambda data: fit(partial(CycleSegmenter, start=0), [long_walk()]),
     "cycles_segment": cycles_segment,
     "pairwise_velocity": lambda data: Work(partial(synchronization_distances, data.hops_on_clock)),
-    "pairwise_pose": lambda data: Work(
-        partial(synchronization_distances, data.hops_on_clock, cost="pose")
-    ),
     "disp_sync": disp_sync,
-    "disp_skeleton": disp_skeleton,
     "to_frame_match": lambda data: of_match(data, "to_frame"),
     "blend": blend,
     "compare_groups40": compare_groups40,

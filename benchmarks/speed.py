@@ -42,10 +42,10 @@ def dtaidistance_pairs(X):
     return lambda: dtw_ndim.distance_matrix_fast(trials, window=window, only_triu=True)
 
 
-def dtaidistance_path(X, share=0.25):
+def dtaidistance_path(X):
     from dtaidistance import dtw_ndim
 
-    window = int(X.shape[1] * share) + 1
+    window = X.shape[1] // 4 + 1
     return lambda: dtw_ndim.warping_path(X[0], X[1], window=window, use_c=True)
 
 
@@ -209,24 +209,7 @@ def cold():
     compare("a new process to its first result", jobs, 3, base, time.perf_counter)
 
 
-def long():
-    """Two takes of 20,000 frames."""
-    rng, n_frames = np.random.default_rng(0), 20_000
-    t, knots = np.linspace(0, 1, n_frames), np.linspace(0, 1, 400)
-    curve = np.column_stack([np.interp(t, knots, rng.standard_normal(400)) for _ in range(16)])
-    warp = t + 0.02 * np.sin(2 * np.pi * t)
-    other = np.column_stack([np.interp(warp, t, column) for column in curve.T])
-    X = np.stack([curve, other]) + 0.05 * rng.standard_normal((2, n_frames, 16))
-    band, base = {"pattern": 0, "max_offset": 0.05}, "dtaidistance path"
-    settings = {PAPERS: band | PAPER, DEFAULTS: band}
-    jobs = installed({base: partial(dtaidistance_path, share=0.05)}, X)
-    for name, chosen in settings.items():
-        sync = DenseSynchronizer(**chosen)
-        jobs[f"`fit` and `match`, {name}"] = lambda sync=sync: sync.fit(X).match(X[1:])
-    compare("two takes of 20,000 frames x 16, `max_offset=0.05`", jobs, 3, base)
-
-
-SECTIONS = {"pair": pair, "pairs": pairs, "whole": whole, "cold": cold, "long": long}
+SECTIONS = {"pair": pair, "pairs": pairs, "whole": whole, "cold": cold}
 
 
 def main():
