@@ -291,7 +291,8 @@ def fill_by_take(points, longest=np.inf, times=None):
     hidden = np.isnan(points).any(axis=2)
     out = np.where(hidden[:, :, np.newaxis], np.nan, points)
     # Where others are hidden at other times, lines are good enough to learn from.
-    bridged = interpolate_gaps(out.reshape(len(out), -1), times=times, held=True, way="line")
+    columns = out.reshape(len(out), hidden.shape[1] * out.shape[2])
+    bridged = interpolate_gaps(columns, times=times, held=True, way="line")
     known, bridged = out.copy(), bridged.reshape(out.shape)
     gaps = sorted(_gaps_of(hidden).items(), key=lambda gap: (gap[0][1] - gap[0][0], gap[0]))
     for (first, end), chosen in gaps:
@@ -365,19 +366,19 @@ def _regressions(wanted, others, seen):
     energy = np.square(centred[seen]).sum() or 1.0
     # Penalties take next to nothing of a constant with the energy of all columns together.
     poses = np.column_stack([centred, np.full(len(others), np.sqrt(energy / seen.sum()))])
-    values, axes = np.linalg.eigh(poses[seen].T @ poses[seen])
-    poses = poses @ axes
-    products, penalty = poses[seen].T @ wanted[seen], energy / len(values)
+    learnt = poses[seen]
+    values, axes = np.linalg.eigh(learnt.T @ learnt)
+    products, penalty = axes.T @ (learnt.T @ wanted[seen]), energy / len(values)
 
     def predict(rows, left_out):
-        out, gone = [], poses[left_out]
+        out, near, gone = [], poses[rows] @ axes, poses[left_out] @ axes
         for ridge in RIDGES:
             inverse = 1 / (np.maximum(values, 0)[:, np.newaxis] + ridge * penalty)
             slopes, spread = inverse * products, inverse * gone.T
             # Woodbury's identity takes these frames out of the moments.
             wrong = wanted[left_out] - gone @ slopes
             slopes -= spread @ np.linalg.solve(np.eye(len(gone)) - gone @ spread, wrong)
-            out.append(poses[rows] @ slopes)
+            out.append(near @ slopes)
         return out
 
     return predict

@@ -45,6 +45,7 @@ def test_fill_gaps_fills_inner_gaps_up_to_max_gap():
     error = all_filled["a_x"].to_numpy() - np.sin(np.arange(60) / 9)
     assert np.abs(error).max() < 6e-3
     pd.testing.assert_frame_equal(fill_gaps(df, 0), df)
+    pd.testing.assert_frame_equal(fill_gaps(df[:0], 4), df[:0])
 
 
 def test_two_known_frames_are_joined_by_a_line_and_none_stay_missing():
