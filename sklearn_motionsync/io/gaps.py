@@ -120,8 +120,8 @@ def fill_gaps(
     regression. All these guesses are averaged; the weight of each is its error to the power of -12,
     in gaps as long, and half as long, elsewhere in the recording. So a joint that moves with the
     others follows them, and one that does not is interpolated. A recording too short for such gaps
-    is interpolated by Akima's polynomials. A gap takes about a fortieth of a second if 40 joints were
-    recorded for 1,000 frames, and three times as long in 10,000 frames.
+    is interpolated by Akima's polynomials. A gap takes about a fortieth of a second in 1,000
+    frames of 40 joints, and three times as long in 10,000 frames.
 
     The longer the gap and the less regular the movement, the larger the error; the page "Work with
     gaps and hidden limbs" of the manual has a table.
