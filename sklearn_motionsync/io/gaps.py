@@ -123,6 +123,7 @@ def fill_gaps(
     is interpolated by Akima's polynomials. A gap takes about a fortieth of a second in 1,000
     frames of 40 joints, and three times as long in 10,000 frames.
 
+    A wrong frame beside a gap, or of another joint in it, is taken for movement: hide it before.
     The longer the gap and the less regular the movement, the larger the error; the page "Work with
     gaps and hidden limbs" of the manual has a table.
 

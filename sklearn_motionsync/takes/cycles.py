@@ -70,6 +70,8 @@ _COLUMNS = {
 }
 
 
+# Why a take is refused after a fit.
+_UNLIKE = "does not follow the pattern"
 # The foot whose strike begins a cycle.
 STRIKES = {f"{side} strike": side for side in SIDES}
 
@@ -164,9 +166,8 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
     separately, as they have no common pattern, and a movement of one side of the body for each
     side. Scale features of different units before, with ``FrameWise(StandardScaler())``.
 
-    Give several features if takes may show other movements. After ``fit`` a take need not repeat,
-    and nearly all that goes up and down follows the cycle of a single feature: of 20 takes of
-    smoothed noise at least 19 were cut by one feature, 2 to 7 by two, and at most 2 by three.
+    A take of one or two features must repeat by itself, as nearly all that goes up and down follows
+    a cycle of these: give more features if it may hold a single repetition.
 
     Examples
     --------
@@ -251,7 +252,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
                 if not any(followed):
                     break
                 learnt = mean_of(followed), learnt[1]
-            self._check_cyclic(takes, repeats, followed, stacklevel=4)
+            self._check_cyclic(takes, repeats, followed, fits=True)
             if not any(followed):
                 n = len(takes)
                 none = "The take is not" if n == 1 else f"None of the {n} takes is"
@@ -306,7 +307,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         collection, takes = check_takes(self, X, reset=False)
         rows, periods = [], []
         followed, repeats = self._follow(collection, takes)
-        self._check_cyclic(takes, repeats, followed, stacklevel=3)
+        self._check_cyclic(takes, repeats, followed, fits=False)
         for i, stretches in enumerate(followed):
             # Where several cycles fit there was a warning of that.
             several = len(repeats[i].correlation.periods) > 1
@@ -372,7 +373,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
             if fitted:
                 ends = [stretch.ends for stretch in followed[i]]
                 n_cycles = sum(stretch.n_cycles for stretch in followed[i])
-                reason = "" if ends else reason or "does not follow the pattern"
+                reason = "" if ends else _UNLIKE
             measures = correlation.period, n_cycles, correlation.strength
             fits = correlation.periods.tolist()
             rows.append((len(takes[i]), *measures, not reason, reason, fits, ends))
@@ -397,17 +398,22 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
             ]
         return followed, repeats
 
-    def _check_cyclic(self, takes, repeats, followed, stacklevel):
+    def _check_cyclic(self, takes, repeats, followed, *, fits):
         """An error if a take, or all of them, follow no cycle; a warning if several cycles fit."""
         missing = [i for i, stretches in enumerate(followed) if not stretches]
         if missing and self.not_cyclic == "raise":
             i, (_, best, reason) = missing[0], repeats[missing[0]]
             within = "" if self.period is None else f" within period={self.period}"
+            required = (
+                f"Its self-correlation is {best.strength:.2f} at {best.n_cycles:.2f} cycles; "
+                f"threshold={self.threshold:g} and at least {LEAST_CYCLES} cycles are required"
+            )
+            if not fits:
+                reason = _UNLIKE
+                required = "A whole cycle with a score of at least 0.5 is required"
             raise ValueError(
-                f"{takes.called(i)}: {reason or 'does not follow the pattern'}{within}. Its "
-                f"self-correlation is {best.strength:.2f} at {best.n_cycles:.2f} cycles; "
-                f"threshold={self.threshold:g} and at least {LEAST_CYCLES} cycles are required. "
-                'Leave it out, give a longer take, or set not_cyclic="skip"; see report(X).'
+                f"{takes.called(i)}: {reason or _UNLIKE}{within}. {required}. Leave it out, give a "
+                'longer take, or set not_cyclic="skip"; see report(X).'
             )
         several = {
             i: stretch.correlation
@@ -424,7 +430,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
                 "takes. Give period=(least, largest), in frames, to choose; report(X)['periods'] "
                 "lists what fits.",
                 UserWarning,
-                stacklevel=stacklevel,
+                stacklevel=4 if fits else 3,
             )
 
     def _find_start(self, collection, features, followed, strikes):

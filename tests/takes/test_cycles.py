@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.ndimage import gaussian_filter1d
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import estimator_checks
 from sklearn_motionsync import (
@@ -292,8 +293,21 @@ def test_a_take_of_few_cycles_teaches_with_the_others(gait):
     report = segmenter.report([short, whole[:50]])
     assert report["cyclic"].tolist() == [True, False]
     assert report["n_cycles"][0] == pytest.approx(1.52, abs=0.1)
-    with pytest.raises(ValueError, match=r"Trial 1: (not cyclic|holds).* or set not_cyclic"):
+    assert report["reason"].tolist() == ["", "does not follow the pattern"]
+    with pytest.raises(ValueError, match=r"Trial 1: does not .* 0\.5 is required.* set not_cyclic"):
         segmenter.segment([short, whole[:50]])
+
+
+@pytest.mark.parametrize("n_features", [1, 2])
+def test_in_few_features_only_what_repeats_by_itself_follows(n_features):
+    """All that goes up and down is like the cycle of a single feature."""
+    rng, skip = np.random.default_rng(0), CycleSegmenter(start=0, not_cyclic="skip")
+    t = 2 * np.pi * np.arange(400)[:, np.newaxis] / 50
+    skip.fit([np.sin(t + k + np.arange(n_features)) + 0.4 * np.cos(2 * t) for k in range(3)])
+    noise = list(gaussian_filter1d(rng.normal(size=(20, 600, n_features)), 8, axis=1))
+    follows, repeats = skip.report(noise)["cyclic"], CycleSegmenter().report(noise)["cyclic"]
+    assert not (follows & ~repeats).any()
+    assert follows.sum() <= 8
 
 
 def test_threshold_is_higher_below_two_cycles():
