@@ -99,12 +99,6 @@ def plain_loops(x, y, costs, mu, subframes, max_disparity):
     return row[last]
 
 
-def global_distances(X, costs, mu, subframes, max_disparity):
-    """The sum of the smallest costs of every trial, as the base, to all (Eq. 19)."""
-    settings = costs, mu, subframes, max_disparity
-    return np.array([sum(plain_loops(x, y, *settings) for y in X) for x in X])
-
-
 def slow_filter(x, sigma, order):
     """A sampled Gaussian, or its derivative, by explicit sums over the point reflections."""
     n = len(x)

@@ -13,14 +13,11 @@ import skops.io
 import xarray as xr
 from sklearn import clone, config_context
 from sklearn.exceptions import NotFittedError
-from sklearn.pipeline import make_pipeline
 from sklearn.utils import estimator_checks, get_tags
 from sklearn.utils.estimator_checks import parametrize_with_checks
 from sklearn_motionsync import (
     ActionClassifier,
-    ActionModel,
     ASpace,
-    DenseSynchronizer,
     DirectionCosines,
     JointPositions,
     LinearSynchronizer,
@@ -346,15 +343,6 @@ def test_inverse_transform_takes_pandas_output(trials):
         np.testing.assert_array_equal(fitted.inverse_transform(points), expected)
         with pytest.raises(ValueError, match="should match"):
             fitted.inverse_transform(points[points.columns[::-1]])
-
-
-@pytest.mark.parametrize("estimator", BODY, ids=by_name)
-def test_pandas_through_a_pipeline(estimator, trials):
-    pipe = make_pipeline(clone(estimator), ASpace(), DenseSynchronizer(), ActionModel())
-    plain = clone(pipe).fit(trials).score_samples(trials)
-    with config_context(transform_output="pandas"):
-        framed = clone(pipe).fit(trials).score_samples(trials)
-    np.testing.assert_array_equal(plain, framed)
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)

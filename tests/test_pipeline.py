@@ -1,4 +1,4 @@
-"""The estimators together, in scikit-learn's own tools, on synthetic and on real people."""
+"""The estimators together, in scikit-learn's own tools, and the main example."""
 
 import runpy
 import sys
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sklearn import clone, config_context
 from sklearn.exceptions import NotFittedError
-from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
+from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -29,28 +29,6 @@ from sklearn_motionsync.display import (
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "plot_bending.py"
-
-
-def make_pipe(skeleton, synchronizer):
-    return make_pipeline(DirectionCosines(skeleton), ASpace(8), synchronizer, ActionModel())
-
-
-def test_people_are_accepted_and_another_action_scores_lower(bends, hdm05):
-    others = [x for x, t in zip(hdm05.data, hdm05.target, strict=True) if t.startswith("hop")]
-    pipe = make_pipe(bends.skeleton, DenseSynchronizer(60)).fit(bends.data)
-    assert (pipe.predict(bends.data) == 1).mean() > 0.9
-    assert pipe.score_samples(others).max() < pipe.score_samples(bends.data).min()
-
-
-@pytest.mark.nightly
-def test_dense_beats_linear_on_held_out_actors(bends):
-    """Synchronised trials of new people are more probable under the model."""
-    given = {"groups": bends.actor, "cv": GroupKFold(4)}
-    dense, linear = (
-        cross_val_score(make_pipe(bends.skeleton, synchronizer), bends.data, **given).mean()
-        for synchronizer in (DenseSynchronizer(60), LinearSynchronizer(60))
-    )
-    assert dense > linear
 
 
 # -- pipelines within pipelines ---------------------------------------------------------
@@ -147,13 +125,6 @@ def test_displays_and_scorers_take_key_frames(nested, routing, marked, points):
     np.testing.assert_array_equal(display.after, after)
     np.testing.assert_array_equal(model.trials, after)
     assert len(people.axes_) == 2
-
-
-@pytest.mark.parametrize("name", list(OF_PIPELINES)[:-1])
-def test_every_caller_says_how_to_give_key_frames(name, marked):
-    for pipe in marked:
-        with pytest.raises(ValueError, match=r"fitted with key-frames.*keyframes=\[...\] beside X"):
-            OF_PIPELINES[name](pipe, FEW.data)
 
 
 @pytest.mark.parametrize("name", OF_PIPELINES)

@@ -119,12 +119,6 @@ def test_number_of_real_events_is_the_documented_one(harness, real_data):
 # -- moments on one time line ------------------------------------------------------------
 
 
-@pytest.fixture
-def powers():
-    """Warps of four clips: frame p of the pattern is frame 99 (p / 99)^k of a clip."""
-    return np.array([99 * (FRAMES / 99) ** k for k in (0.5, 0.8, 1.25, 2.0)])
-
-
 def test_warps_that_are_late_miss_by_what_they_are_late(harness):
     moments, late = np.array([40.0, 44, 49, 61]), np.array([0.0, 3, 9, 17])
     # On the time line: 40, 41, 40 and 44. The six distances, each of two pairs, are 0 to 4.

@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from joblib import parallel_config
-from sklearn.neighbors import KNeighborsClassifier
-from sklearn_motionsync import DirectionCosines, to_frame
+from sklearn_motionsync import to_frame
 from sklearn_motionsync.recognition import distances, synchronization_distances
 from sklearn_motionsync.recognition.distances import (
     BLOCK,
@@ -227,19 +226,3 @@ def test_two_frames():
         assert np.isfinite(D).all()
     expected = [[0, 8, 0], [8, 0, 8], [0, 8, 0]]
     np.testing.assert_allclose(synchronization_distances(X, n_frames=2), expected)
-
-
-# -- people -----------------------------------------------------------------------------
-
-
-def test_nearest_neighbours_among_new_people(utkinect):
-    """The nearest clip of nine other people is of the same action."""
-    X = DirectionCosines(utkinect.skeleton).fit_transform(utkinect.data)
-    D = synchronization_distances(X, cost="velocity", n_frames=20)
-    found = np.empty_like(utkinect.target)
-    for actor in np.unique(utkinect.actor):
-        out = utkinect.actor == actor
-        nearest = KNeighborsClassifier(1, metric="precomputed")
-        nearest.fit(D[np.ix_(~out, ~out)], utkinect.target[~out])
-        found[out] = nearest.predict(D[np.ix_(out, ~out)])
-    assert np.mean(found == utkinect.target) > 0.8

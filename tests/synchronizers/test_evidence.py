@@ -34,6 +34,9 @@ def test_warps_of_noise_are_warned_of():
     assert sync.evidence_.remaining > 0.7
     assert sync.evidence_.inconsistency > 0.7
     assert not sync.refines_
+    match = sync.match(chance(12))
+    assert match.doubtful.all()
+    assert "warps contradict each other" in " ".join(match.reasons)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     Match,
     PartSynchronizer,
-    SynchronizationWarning,
 )
 from sklearn_motionsync.inputs import validation
 
@@ -208,20 +207,6 @@ def test_the_way_back_of_a_movement_that_is_alike_both_ways_is_not_doubted(bends
     assert not sync.match(X[18:]).doubtful.any()
     assert sync.match([x[::-1] for x in X[18:]]).doubtful.mean() < 0.5
     assert sync.match([np.concatenate([x, x]) for x in X[18:]]).doubtful.mean() > 0.6
-
-
-def test_trials_of_a_set_without_support_are_doubtful(utkinect):
-    chosen = [
-        i for i, t in enumerate(utkinect.target) if t == "throw" and len(utkinect.data[i]) >= 8
-    ]
-    some = np.unique(np.linspace(0, len(chosen) - 1, 12).astype(int))
-    data = [utkinect.data[chosen[i]] for i in some]
-    X = make_pipeline(DirectionCosines(utkinect.skeleton), ASpace(0.95)).fit_transform(data)
-    with pytest.warns(SynchronizationWarning):
-        sync = DenseSynchronizer(100).fit(X)
-    match = sync.match(X)
-    assert match.doubtful.all()
-    assert "warps contradict each other" in " ".join(match.reasons)
 
 
 # -- key-frames and calibration -----------------------------------------------------------

@@ -94,14 +94,6 @@ def test_warps_hardly_depend_on_the_unit_in_single_precision(estimator, X, expon
 @every_synchronizer
 @few
 @given(trials(), st.randoms(use_true_random=False))
-def test_warps_do_not_depend_on_the_order_of_trials(estimator, X, random):
-    order = random.sample(range(len(X)), len(X))
-    assert_close(times(estimator, [X[i] for i in order]), times(estimator, X)[order])
-
-
-@every_synchronizer
-@few
-@given(trials(), st.randoms(use_true_random=False))
 def test_warps_do_not_depend_on_the_order_of_features(estimator, X, random):
     order = random.sample(range(X[0].shape[1]), X[0].shape[1])
     assert_close(times(estimator, [x[:, order] for x in X]), times(estimator, X))
