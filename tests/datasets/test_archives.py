@@ -95,13 +95,6 @@ def test_other_files_are_refused(tmp_path):
             load_trials(tmp_path / "a.npz")
 
 
-def test_real_archives_have_skeletons(real_data, hdm05, utkinect):
-    assert len(hdm05.data) == len(hdm05.target) == 132
-    assert (hdm05.skeleton, utkinect.skeleton) == (Skeleton.acclaim(), Skeleton.kinect())
-    walks = load_trials(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
-    assert walks.skeleton is not None
-
-
 # -- damaged archives -------------------------------------------------------------------
 
 

@@ -11,7 +11,6 @@ from sklearn_motionsync.io.motion import ENDINGS, FORMATS
 
 import fuzz_readers
 from motion_files import EXAMPLES, c3d, put, storage, texts, tracks, trc
-from plain_readers import PLAIN
 
 ROOT = Path(__file__).resolve().parents[2]
 MANUAL = (ROOT / "docs" / "howto" / "motion_files.md").read_text(encoding="utf-8")
@@ -166,16 +165,6 @@ def test_wrong_parameters_are_refused(tmp_path, key, params, message):
 
 
 # -- recordings -------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "name", ["bvh/007_01.bvh", "asf_amc/02_02.amc", "asf_amc/HDM_bk_depositFloorR_011_120.amc"]
-)
-def test_real_files_agree_with_plain_parsers(real_data, name):
-    path = real_data / "original_files" / name
-    expected = PLAIN[path.suffix](path)
-    found = read_motion(path).to_numpy().reshape(expected.shape)
-    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max(), rtol=0)
 
 
 # -- several files ------------------------------------------------------------------------

@@ -385,10 +385,3 @@ def test_bands_of_another_action_are_wider_and_hold_as_often(jogs, of_bends):
         widths.append(np.sqrt(variances).mean())
     assert widths[1] > 1.3 * widths[0]
     assert inside[1] > inside[0] - 0.05
-
-
-def test_jogging_is_lost_under_a_model_of_bends(jogs, people):
-    X = people[3].transform(people[0][:6])
-    tracker = MotionTracker(LinearSynchronizer(), 100).fit(X)
-    assert tracker.track(jogs[0]).lost.mean() > 0.4
-    assert not tracker.track(X[0]).lost.any()
