@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 from sklearn_motionsync import DenseSynchronizer, to_frame, to_trials
 from sklearn_motionsync.datasets import make_gait
-from sklearn_motionsync.io import cut_at_events, keyframes_from_events, read_motion
+from sklearn_motionsync.io import cut_at_events, keyframes_from_events
 
 LENGTHS = [101, 121, 91]
 # Of (subject, trial): toe-off and knee flexed, in frames.
@@ -192,17 +192,3 @@ def test_events_of_cut_cycles(gait_cycles):
     times = sync.match(cycles, keyframes=found).times
     met = [np.interp(sync.keyframes_[0], np.arange(60), tau) for tau in times]
     np.testing.assert_allclose(met, own, atol=1e-3)
-
-
-@pytest.mark.filterwarnings("ignore:.*missing:UserWarning")
-def test_events_of_real_files(real_data):
-    files = sorted((real_data / "original_files" / "c3d").glob("*.c3d"))
-    trials = [read_motion(path) for path in files]
-    found = keyframes_from_events(trials)
-    assert found.columns.tolist() == ["RIC", "RHS", "RTO"]
-    # As the files have them, at 50 frames a second.
-    np.testing.assert_allclose(found, [[136, 270, 366]] * len(trials), atol=1e-3)
-    seconds = pd.DataFrame([e | {"trial": "Eb015pi"} for e in trials[0].attrs["events"]])
-    again = keyframes_from_events(trials[:1], seconds.drop(columns="frame"))
-    np.testing.assert_allclose(again, [[136, 270, 366]], atol=1e-3)
-    assert keyframes_from_events(trials, names=["rto"]).shape == (len(trials), 1)
