@@ -30,6 +30,8 @@ SHRINKAGE = 0.2
 # many gaps each is tried; and the power of its error there that is its weight (docs/design.md).
 RIDGES = 1e-1, 1e-3, 1e-6
 TRIES, POWER = 10, -12
+# A guess is left out if it is so many times farther from a line than in all gaps that were tried.
+FARTHEST_BEND = 2
 # Frames beside a gap that a cubic spline goes by; those farther away do not change it.
 REACH = 10
 WAYS = {"line": None, "akima": Akima1DInterpolator, "cubic": CubicSpline}
@@ -339,21 +341,30 @@ def _fill_gap(wanted, others, first, end, times):
         return np.concatenate(guesses, axis=2)[REACH : REACH + length]
 
     # As long as the gap, and half as long, with two frames on either side.
-    hidden, errors = np.cumsum(np.pad(~seen, (1, 0))), []
+    hidden, errors, bends = np.cumsum(np.pad(~seen, (1, 0))), [], []
     for length in sorted({end - first, (end - first + 1) // 2}):
         starts = 2 + np.flatnonzero(hidden[length + 4 :] == hidden[: -length - 4])
         if len(starts):
             starts = starts[whole(np.linspace(0, len(starts) - 1, min(TRIES, len(starts))))]
             truth = wanted[np.arange(length)[:, np.newaxis] + starts]
-            wrong = guess(starts, length) - truth[:, :, np.newaxis]
+            guesses = guess(starts, length)
+            wrong = guesses - truth[:, :, np.newaxis]
             errors.extend(np.sqrt(np.square(wrong).mean(axis=(0, 3))))
+            bends.append(_bends(guesses).max(axis=0))
     if not errors:
         return interpolate_gaps(wanted, times=times)[first:end]
     logs = np.log(np.maximum(errors, ROUNDING * np.max(errors) or 1)).mean(axis=0)
     weights = np.exp(POWER * (logs - logs.min()))
     near = np.clip(np.arange(first - REACH, end + REACH), 0, len(times) - 1)
-    guesses = guess(np.array([first]), end - first, times[near])[:, 0]
-    return np.tensordot(guesses, weights / weights.sum(), (1, 0))
+    guesses = guess(np.array([first]), end - first, times[near])
+    # A curve that bends far more than in all other gaps rings, as beside a wrong frame.
+    weights *= _bends(guesses)[0] <= FARTHEST_BEND * np.max(bends, axis=0)
+    return np.tensordot(guesses[:, 0], weights / weights.sum(), (1, 0))
+
+
+def _bends(guesses):
+    """How far guesses (length, n_gaps, n_guesses, n_columns) are at most from the first, a line."""
+    return np.abs(guesses - guesses[:, :, :1]).max(axis=(0, 3))
 
 
 def _regressions(wanted, others, seen):

@@ -375,6 +375,17 @@ def test_what_no_other_point_tells_is_left_to_the_line():
     assert np.sum(errors["filled"]) < 1.05 * np.sum(errors["line"])
 
 
+def test_a_wrong_frame_near_a_gap_does_not_ring_in_it():
+    """A cubic spline through it would be 480 away, and Akima's polynomials are 0.4."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, 300)[:, np.newaxis, np.newaxis]
+    frequencies, phases = rng.uniform(3, 6, (5, 3)), rng.uniform(0, 6, (5, 3))
+    points = np.sin(2 * np.pi * frequencies * t + phases)
+    given = points.copy()
+    given[141, 0, 0] += 100
+    given[120:140, 0] = np.nan
+    assert np.abs(fill_by_take(given) - points)[120:140, 0].max() < 0.4
+
+
 def test_gaps_that_are_long_or_touch_an_end_stay_and_short_takes_are_interpolated():
     points = walking(5)
     gappy = cut(points, (0, 4, [1]), (40, 49, [2]), (60, 70, [3]), (115, 120, [1]), (0, 120, [5]))
