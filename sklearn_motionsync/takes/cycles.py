@@ -106,7 +106,7 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         Skeleton of joint positions: then directions of limbs are compared, independent of path and
         heading, and the positions are cut as they are. None compares the features themselves, each
         weighted by its variance.
-    start : {"left", "right", "ahead", "left strike", "rest"}, str or int, default=None
+    start : str or int, default=None
         Where cycles begin. With a skeleton ``"left"`` or ``"right"``: where that ankle is farthest
         ahead of the pelvis, some hundredths of a second before the foot strikes; ``"ahead"``: the
         same for the foot that comes farther; ``"left strike"`` or ``"right strike"``: where that
@@ -311,11 +311,12 @@ class CycleSegmenter(LongWorkMixin, BaseEstimator):
         for i, stretches in enumerate(followed):
             # Where several cycles fit there was a warning of that.
             several = len(repeats[i].correlation.periods) > 1
+            period = np.nan if several else period_of(stretches)
             for number, stretch in enumerate(stretches):
                 pieces = cut_cycles(stretch, self.pattern_)
                 pieces = [piece for piece in pieces if piece.complete or self.incomplete]
                 rows += [(i, number, *piece) for piece in pieces]
-                periods += [np.nan if several else period_of(stretches)] * len(pieces)
+                periods += [period] * len(pieces)
         table = pd.DataFrame(rows, columns=list(_COLUMNS)).astype(_COLUMNS)
         # Whole cycles that are far longer or far shorter than the period of their take.
         shares = ((table["stop"] - 1 - table["start"]) / np.array(periods))[table["complete"]]

@@ -136,7 +136,7 @@ class Stretch(NamedTuple):
 
 
 def follow(features, repetitions, pattern, period):
-    """The `Stretch` of a take that follow a cycle, in order of time.
+    """The stretches of a take that follow a cycle, in order of time.
 
     The take is decoded at the period of each of its repetitions. If none is as long as the pattern,
     it is also decoded at that of the pattern, but not in one or two features, which all that goes
