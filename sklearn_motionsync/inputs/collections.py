@@ -27,6 +27,7 @@ from .facts import facts_of
 from .numbers import (
     FLOATS,
     LARGEST,
+    SMALLEST,
     as_numbers,
     check_finite,
     check_magnitude,
@@ -220,7 +221,8 @@ def check_members(
             peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
         if peak > largest:
             largest, holder = peak, i
-    check_magnitude(largest, what(holder), training=training)
+    if not SMALLEST <= largest <= LARGEST:
+        check_magnitude(largest, what(holder), training=training)
     if dtype is None:
         dtype = np.float32 if {a.dtype for a in arrays} == {np.dtype(np.float32)} else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.
@@ -242,6 +244,8 @@ def as_collection(X):
     for kind in set(map(type, X if isinstance(X, (list, tuple)) else [X])):
         if way := _CONTAINERS.get((kind.__module__.partition(".")[0], kind.__name__)):
             raise ValueError(f"{ACCEPTED}, got {kind.__name__}. {way}")
+    if isinstance(X, (list, tuple)):
+        return _members(X)
     X = as_pandas(X)
     if isinstance(X, pd.DataFrame):
         if is_nested(X):
@@ -256,8 +260,6 @@ def as_collection(X):
                 "n_joints, n_dims) are given as [x.reshape(len(x), -1) for x in X]."
             )
         return _members(list(X)) if X.dtype == object and X.ndim == 1 else None
-    if isinstance(X, (list, tuple)):
-        return _members(X)
     if issparse(X):
         return None
     if isinstance(X, (dict, set, frozenset, str, bytes)) or _has_no_order(X):

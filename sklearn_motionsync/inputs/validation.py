@@ -218,7 +218,8 @@ def check_input(
     free = reset and not named and getattr(estimator, "skeleton", None) is None
     if free and all(len(x) < width for x in out):
         _warn_of_exchanged_axes(out)
-    check_facts(estimator, out.facts, out.called, reset=reset, which=facts)
+    if reset or out.facts:
+        check_facts(estimator, out.facts, out.called, reset=reset, which=facts)
     if reset and level == "pose":
         warn_of_findings(out, names_of_input(estimator), clocks=False)
     return out

@@ -18,7 +18,7 @@ from scipy.linalg import solveh_banded
 
 from .filters import SMOOTHING, smooth
 from .metric import LONGEST_LAG
-from .sizes import EQUAL
+from .sizes import CACHE_NUMBERS, EQUAL
 
 # Largest share of the variance that matching leaves of copies of one source: docs/design.md.
 SAME_SOURCE = 0.025
@@ -74,9 +74,15 @@ class Refiner(NamedTuple):
         -------
         ndarray, shape (n_trials, P)
         """
-        n_frames = times.shape[1]
-        if n_frames < 5:
+        if times.shape[1] < 5:
             return times
+        size = max(1, CACHE_NUMBERS // self.pattern.size)
+        rows = [slice(start, start + size) for start in range(0, len(times), size)]
+        return np.concatenate([self._refined(poses[few], times[few], reach) for few in rows])
+
+    def _refined(self, poses, times, reach):
+        """Refined warps of so few trials that their poses stay in the cache."""
+        n_frames = times.shape[1]
         moving = _smoothed(poses, self.noise_width)
         base, frames = self.pattern[np.newaxis], np.arange(n_frames)
         low, high = np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames - 1)

@@ -9,6 +9,8 @@ import numpy as np
 # Trials that are processed at a time, and numbers in an intermediate array.
 BATCH = 64
 BATCH_NUMBERS = 1 << 20
+# Numbers in an array that is used again and again, so that it stays in a processor's cache.
+CACHE_NUMBERS = 1 << 17
 # Frames of a clip that tell as much as more would.
 FRAMES = 100
 # A feature whose range is less than this share of its magnitude is constant.

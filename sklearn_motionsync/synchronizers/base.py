@@ -45,7 +45,7 @@ from ..matching.filters import SMOOTHING
 from ..matching.gaps import is_gappy
 from ..matching.matcher import Features
 from ..matching.median import Median, linear_median
-from ..matching.warps import normalise
+from ..matching.warps import normalise, sample
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from ..utils.pipelines import Routed, remember_match
@@ -53,11 +53,9 @@ from .intervals import Intervals, joined
 from .match import Match, check_match
 from .training import (
     TrainingSet,
-    check_fill,
     check_pattern,
     fill_trials,
     fill_warped,
-    hold_gaps,
     learn_filler,
     pattern_of,
     put_on_clock,
@@ -242,7 +240,7 @@ class Synchronizer(LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, Bas
         >>> bool((aligned == sync.transform(gait.data)).all())
         True
         """
-        check_fill(fill)
+        _check_fill(fill)
         trials = self.check_trials(X)
         check_match(match, len(trials), self.n_frames_, type(self).__name__)
         # What was hidden in the match is hidden here, too.
@@ -327,7 +325,7 @@ class Synchronizer(LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, Bas
         return self._learnt(training, clock, pattern, clock.poses)
 
     def _warp(self, X, fill=None, **params):
-        check_fill(fill)
+        _check_fill(fill)
         # Further parameters are given for all trials at once.
         source = None if params else self._read_in_parts(X)
         if source is None:
@@ -343,8 +341,8 @@ class Synchronizer(LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, Bas
         return trials
 
     def _warped(self, trials, match):
-        """Checked trials at the times of their match."""
-        return match.warp(trials)
+        """Checked trials at the times of their match (Eq. 18)."""
+        return sample(trials, match.times, self.n_frames_)
 
     def _restored(self, trials, out, fill):
         """Warped trials as ``transform`` gives them."""
@@ -407,7 +405,7 @@ class Synchronizer(LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, Bas
 
     def _without_gaps(self, trials):
         """Checked trials, filled where they are NaN."""
-        if not hold_gaps(trials):
+        if not _hold_gaps(trials):
             return trials
         filler = self._filler or learn_filler(self.examples_)
         return fill_trials(filler, trials)
@@ -421,7 +419,7 @@ class Synchronizer(LongWorkMixin, SequenceLevelMixin, TrialTransformerMixin, Bas
         """
         checked = self._check_training_set(X, numbers, looks=confidence is None)
         trials, filler = with_confidence(checked, confidence), None
-        if hold_gaps(trials):
+        if _hold_gaps(trials):
             filler = learn_filler(trials, names_of_input(self))
             trials = fill_trials(filler, trials)
         return TrainingSet(trials, filler, population or len(trials))
@@ -629,7 +627,8 @@ class AnchoredSynchronizer(Synchronizer):
         return params
 
     def _seen(self, trials, params):
-        return with_confidence(trials, params.pop("confidence", None))
+        confidence = params.pop("confidence", None)
+        return trials if confidence is None else with_confidence(trials, confidence)
 
     def _shares(self, trials, keyframes, frame_rate):
         """Key-frames of trials as shares of them, by those of the fit; None if none are."""
@@ -642,3 +641,18 @@ class AnchoredSynchronizer(Synchronizer):
             )
         rows = Keyframes(keyframes, len(trials), frame_rate)
         return rows.shares(trials, len(self.keyframes_))
+
+
+def _check_fill(fill):
+    """Refuse a ``fill`` that there is not."""
+    if fill is not None and not (isinstance(fill, str) and fill == "model"):
+        raise ValueError(
+            f"fill={fill!r} is unknown: use None to keep what was hidden as NaN, or 'model' to "
+            "fill it from the mean of the warped training set."
+        )
+
+
+def _hold_gaps(trials):
+    """Whether anything of trials is NaN, or not sure; they hold no infinity."""
+    sums = [x.sum() for x in trials]
+    return trials.confidence is not None or bool(np.isnan(sums).any())

@@ -316,12 +316,6 @@ def _are_principal_components(trials):
 _SURE = 0.5
 
 
-def hold_gaps(trials):
-    """Whether anything of trials is NaN, or not sure; they hold no infinity."""
-    sums = [x.sum() for x in trials]
-    return trials.confidence is not None or bool(np.isnan(sums).any())
-
-
 def with_confidence(trials, confidence):
     """Trials of which what is less sure than not is hidden.
 
@@ -444,15 +438,6 @@ def known_whole(trials, but):
     """Indices of filled trials that had no gaps, but for one."""
     weights = trials.weights or [np.ones(1)] * len(trials)
     return np.array([i for i, w in enumerate(weights) if i != but and w.min() == 1], np.intp)
-
-
-def check_fill(fill):
-    """Refuse a ``fill`` that there is not."""
-    if fill is not None and not (isinstance(fill, str) and fill == "model"):
-        raise ValueError(
-            f"fill={fill!r} is unknown: use None to keep what was hidden as NaN, or 'model' to "
-            "fill it from the mean of the warped training set."
-        )
 
 
 def fill_warped(warped, examples):
