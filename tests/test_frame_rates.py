@@ -47,9 +47,13 @@ def with_files(tmp_path):
     io.write_motion(path, WALK.data[0], WALK.skeleton, frame_rate=100)
     norm = {"norm": "A", "groups": GAIT.person}
     calls = {
+        "compare_effects": partial(
+            comparison.compare_effects, DENSE, X, {"group": GAIT.group}, "group"
+        ),
         "compare_events": partial(comparison.compare_events, X, EVENTS),
         "compare_groups": partial(comparison.compare_groups, DENSE, X, GAIT.group),
         "compare_to_norm": partial(comparison.compare_to_norm, DENSE, X, GAIT.group, **norm),
+        "plan_study": partial(comparison.plan_study, DENSE, X, GAIT.group, n_studies=10),
         "make_bending": partial(datasets.make_bending, 2),
         "make_gait": partial(datasets.make_gait, 2),
         "make_walk": partial(datasets.make_walk, 1),

@@ -35,7 +35,12 @@ from sklearn_motionsync import (
     to_frame,
     to_trials,
 )
-from sklearn_motionsync.comparison import compare_groups, compare_to_norm
+from sklearn_motionsync.comparison import (
+    compare_effects,
+    compare_groups,
+    compare_to_norm,
+    plan_study,
+)
 from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.live import OnlineSynchronizer
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
@@ -170,6 +175,13 @@ CALLS = {
         display.TrellisDisplay.from_estimator(s.sync, s.X, trial=s.trial, **s.params).warp
     ),
     "blend_trials": blended,
+    "compare_effects": lambda s: compare_effects(
+        # Numbers are covariates.
+        *(s.sync, s.X, {"side": [str(label) for label in s.y]}, "side"),
+        groups=s.groups,
+        n_permutations=99,
+        **s.params,
+    )["side"].to_frame(),
     "compare_groups": lambda s: compare_groups(
         s.sync, s.X, s.y, groups=s.groups, n_permutations=99, **s.params
     ).to_frame(),
@@ -183,6 +195,9 @@ CALLS = {
         find_departures(s.model, s.X, **s.params)[["kind", "limb", "first", "last", "size"]]
         .sort_values(["limb", "first"])
         .reset_index(drop=True)
+    ),
+    "plan_study": lambda s: plan_study(
+        s.sync, s.X, s.y, groups=s.groups, n_studies=10, power=0.01, **s.params
     ),
     "write_player": marks_of,
     "write_report": timing_of,
@@ -216,8 +231,10 @@ OF_MATCH = {
     "GroupDisplay.from_estimator",
     "SynchronizationDisplay.from_estimator",
     "blend_trials",
+    "compare_effects",
     "compare_groups",
     "compare_to_norm",
+    "plan_study",
     "write_report",
 }
 # They take recordings that are no trials, or what was found before.

@@ -130,7 +130,7 @@ def compare_events(
     table = _table_of_groups(of_people, values, names)
     if study is None:
         return table
-    units = study.units(of_people.fill(values))
+    units = study.units(of_people.fill(values)[:, np.newaxis])[:, 0]
     _count_known(units, names, " whose trials are compared")
     rng, progress = check_random_state(random_state), Progress(None, 0)
     curves = [units[:, np.newaxis]]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import t as student
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
@@ -47,12 +49,19 @@ class GroupComparison:
     level : float
         As given.
     design : str
-        What was compared, in words.
+        What was compared, in words; with the ratio of the variances of curves of the groups, if one
+        is twice another: then the larger group, and p, tell less.
     unit : {"frames", "percent", "seconds"}
         Of start, end, peak, and of the sizes of timing.
     smallest_p : float
         That all arrangements of the people allow: 0.125 for four pairs. If it is above ``level``,
         nothing can be found, and ``describe`` says so.
+    bands : DataFrame
+        How large each difference is, found or not, at every ``time`` in the unit: ``what``,
+        ``feature``, ``difference`` in words ("B less A"), ``size``, and ``lower`` and ``upper``,
+        between which the true difference lies with probability ``1 - level`` at all times, in all
+        features, of shape and timing together. ``least`` and ``most`` are the interval of
+        ``1 - 2 level`` at this time alone, for `within`.
 
     Examples
     --------
@@ -79,6 +88,7 @@ class GroupComparison:
     design: str
     unit: Unit
     smallest_p: float
+    bands: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     def __repr__(self):
         return f"GroupComparison({self.describe()!r})"
@@ -95,6 +105,20 @@ class GroupComparison:
         p = np.array([self.p_joint, self.p_shape, self.p_timing, self.p_linear])
         index = pd.Index(names, name="test")
         return pd.DataFrame({"p": p, "differs": p <= self.level}, index=index)
+
+    def within(self) -> pd.Series:
+        """How small differences are shown to be: a test of equivalence.
+
+        Groups are equivalent, at the level of the comparison, within any margin above this: by two
+        one-sided tests at every time, all of which must reject.
+
+        Returns
+        -------
+        Series
+            By what, feature and difference, in the unit of ``size``.
+        """
+        bounds = self.bands[["least", "most"]].abs().max(axis=1)
+        return bounds.groupby([self.bands[name] for name in _OF_BANDS], sort=False).max()
 
     def describe(self) -> str:
         """The answer in one sentence.
@@ -270,17 +294,28 @@ def compare_aligned(
     table = pd.DataFrame(rows, columns=_COLUMNS).sort_values("p", kind="stable", ignore_index=True)
     for name in ("start", "end", "peak"):
         table[name] = aligned.clock[table[name].to_numpy(dtype=int)]
+    z = float(np.quantile(np.maximum(shape.peaks, timing.peaks), 1 - level, method="higher"))
+    bands = [
+        *_bands("shape", curves, aligned, aligned.names, study, z, level),
+        *_bands("timing", offsets, aligned, ["offset"], study, z, level),
+    ]
     return GroupComparison(
         p_joint=max(float(share_at_most(least, least[0])), study.design.floor),
         p_shape=shape.p_value,
         p_timing=timing.p_value,
         p_linear=linear.p_value,
         clusters=table,
-        n_units=len(study.maker),
+        n_units=study.makers.shape[1],
         level=float(level),
-        design=study.words,
+        design=study.words + study.spread(curves),
         unit=aligned.unit,
         smallest_p=study.smallest_p,
+        bands=pd.DataFrame(
+            {
+                name: np.concatenate([band[name] for band in bands])
+                for name in (*_OF_BANDS, "time", "size", "lower", "upper", "least", "most")
+            }
+        ),
     )
 
 
@@ -293,12 +328,36 @@ def _clusters(what, family, values, names, units, study, least, level):
     # The share of permutations in which shape or timing has a p as small.
     p = share_at_most(least, family.shares(np.abs(family.observed)))
     p = np.maximum(p, study.design.floor)
-    for k, feature in enumerate(names):
-        for first, end in runs_of(p[:, k] <= level).tolist():
+    for column in range(p.shape[1]):
+        contrast, k = divmod(column, len(names))
+        for first, end in runs_of(p[:, column] <= level).tolist():
             stretch = slice(first, end)
-            peak = first + first_largest(np.abs(family.observed[stretch, k]))
-            size = study.size(values[:, stretch, k].mean(axis=1), what)
-            yield [what, feature, first, end - 1, peak, p[stretch, k].min(), *size, units[k]]
+            peak = first + first_largest(np.abs(family.observed[stretch, column]))
+            size = study.size(values[:, stretch, column].mean(axis=1), what, contrast)
+            smallest = p[stretch, column].min()
+            yield [what, names[k], first, end - 1, peak, smallest, *size, units[k]]
+
+
+_OF_BANDS = ["what", "feature", "difference"]
+
+
+def _bands(what, values, aligned, names, study, z, level):
+    """Columns of the table of bands, of each difference of each feature; z is that of all."""
+    for column in range(values.shape[2]):
+        contrast, k = divmod(column, len(names))
+        for low, high in combinations(range(study.n_levels), 2):
+            size, error, freedom = study.change(values[:, :, column], low, high)
+            all_times = study.design.critical(z, freedom) * error
+            one_time = student.isf(level, freedom) * error
+            texts = what, names[k], study.called(contrast, low, high)
+            yield dict(zip(_OF_BANDS, ([text] * len(size) for text in texts), strict=True)) | {
+                "time": aligned.clock,
+                "size": size,
+                "lower": size - all_times,
+                "upper": size + all_times,
+                "least": size - one_time,
+                "most": size + one_time,
+            }
 
 
 def _confirm(rows, aligned, study):
@@ -310,8 +369,9 @@ def _confirm(rows, aligned, study):
     stretches = [slice(rows[i][2], rows[i][3] + 1) for i in timing]
 
     def effects(offsets):
-        units = study.units(offsets)
-        return [study.design.rows.T @ units[:, stretch].mean(axis=1) for stretch in stretches]
+        units = study.units(offsets[:, :, np.newaxis])
+        tested = study.design.rows[:, : study.design.n_tested].T
+        return [(tested @ units[:, stretch].mean(axis=1)).ravel() for stretch in stretches]
 
     whole = effects(aligned.match.offsets)
     for offsets in aligned.offsets_of_others():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,7 +13,7 @@ from numbers import Integral, Real
 
 import numpy as np
 from scipy.stats import f as fisher
-from scipy.stats import linregress, norm
+from scipy.stats import norm
 from scipy.stats import t as student
 
 from ..inputs.numbers import as_numbers
@@ -27,7 +28,7 @@ _FEWEST = 4
 _ROUNDING = 1e-9
 # A covariate that differs within people by less than this share of its spread between them is one
 # of people; and people in whom it differs by less than this share of what is usual have no slope.
-_OF_PEOPLE = 0.1
+OF_PEOPLE = 0.1
 # A value varies if its spread is more than this share of the largest of its feature.
 _VARIES = 1e-3
 # Heights of a cluster enhancement are this far apart, in standard normal deviates, and the powers
@@ -39,6 +40,8 @@ _LARGEST = 8.0
 _LEAST_FACTOR = 1e-3
 # The spread of a group relative to the others is smoothed by a Gaussian of this share of the clock.
 _OF_CLOCK = 0.2
+# From so large a ratio of variances on, the answer tells it.
+_UNEQUAL = 2.0
 # Permutations that are looked at together.
 _BATCH = 250
 
@@ -50,32 +53,46 @@ class Study:
     Attributes
     ----------
     design : Design
-    maker : ndarray, shape (n_units, n_sequences)
-        The values of a unit are this matrix times those of the trials: a mean, a difference
-        of means, or a slope.
-    groups : ndarray of int, shape (n_units,), or None
-        Of each unit, if units are of several groups.
-    covariate : ndarray, shape (n_units,), or None
-        Of each unit, if units differ in it.
-    labels : list of str
-        Of the groups.
+    makers : ndarray, shape (n_contrasts, n_units, n_sequences)
+        The values of a unit are such a matrix times those of the trials: a mean, a difference
+        of means, or a slope. Of several conditions there is a contrast for each two.
+    labels : list of list of str
+        Of each contrast, what is above what; for a slope, what it is along.
     words : str
+    groups : ndarray of int, shape (n_units,), or None
+        Of each unit, if groups of units are compared that may vary differently.
+    model : ndarray, shape (n_units, n_columns), or None
+        Else sizes are by least squares, with these columns.
+    levels : ndarray, shape (n_levels, n_columns), or None
+        The columns of each level that is compared.
+    prefixes : list of str
+        Of each contrast, what differences are compared; empty for values as they are.
     """
 
     design: Design
-    maker: np.ndarray
-    groups: np.ndarray | None
-    covariate: np.ndarray | None
+    makers: np.ndarray
     labels: list
     words: str
+    groups: np.ndarray | None = None
+    model: np.ndarray | None = None
+    levels: np.ndarray | None = None
+    prefixes: Sequence[str] = ("",)
 
     def units(self, values):
-        """Values (n_units, ...) of those of the trials; NaN where one of these is."""
+        """Values (n_units, P, n_contrasts * n_features) of those (n_sequences, P, n_features).
+
+        NaN where one of these is.
+        """
         missing = np.isnan(values)
-        of_units = np.tensordot(self.maker, np.nan_to_num(values), 1)
+        of_units = self._stacked(np.tensordot(self.makers, np.nan_to_num(values), 1))
         if missing.any():
-            of_units[np.tensordot(self.maker != 0, missing, 1)] = np.nan
+            of_units[self._stacked(np.tensordot(self.makers != 0, missing, 1)) > 0] = np.nan
         return of_units
+
+    def _stacked(self, products):
+        """Contrasts (n_contrasts, n_units, P, n_features) one behind the other."""
+        _, n_units, n_frames, _ = products.shape
+        return np.moveaxis(products, 0, 2).reshape(n_units, n_frames, -1)
 
     @classmethod
     def of(cls, y, groups, *, covariate, paired, n):
@@ -88,7 +105,7 @@ class Study:
         if covariate:
             if paired:
                 raise ValueError("paired=True needs two groups of trials, not a covariate.")
-            return cls._of_covariate(_check_covariate(y, n), persons, groups is not None)
+            return cls._of_covariate(check_covariate(y, n), persons, groups is not None)
         _refuse_measures(y)
         codes, labels = encode_groups(y, n, name="y", at_least=2)
         if groups is not None:
@@ -102,15 +119,12 @@ class Study:
                     f"groups: {name!r} has trials of several labels in y. Set paired=True "
                     "for two labels with the same people; otherwise each person has one label."
                 )
-        maker = _means(persons)
+        maker = means_of_people(persons)
         of_units = codes[_firsts(persons)]
-        counts = np.bincount(of_units)
-        if counts.min() < 2:
-            of = ", ".join(f"{c} in {name!r}" for c, name in zip(counts, labels, strict=True))
-            raise ValueError(f"At least two people a group are needed, got {of}.")
+        check_people(of_units, labels)
         listed = f"{', '.join(labels[:-1])} and {labels[-1]}"
         words = f"{listed}, {_count_units(len(of_units), n, groups is not None)}"
-        return cls(GroupDesign(of_units), maker, of_units, None, labels, words)
+        return cls(GroupDesign(of_units), maker[np.newaxis], [labels], words, of_units)
 
     @classmethod
     def _of_pairs(cls, codes, labels, persons, names):
@@ -118,9 +132,10 @@ class Study:
         if names is None or len(labels) != 2:
             raise ValueError(
                 f"paired=True needs two labels in y, got {len(labels)}, and groups=, whose the "
-                f"trials are{'' if names is not None else ', which are missing'}."
+                f"trials are{'' if names is not None else ', which are missing'}. Of more "
+                "conditions use compare_effects."
             )
-        makers = [_means(persons, codes == k) for k in (0, 1)]
+        makers = [means_of_people(persons, codes == k) for k in (0, 1)]
         for maker, label in zip(makers, labels, strict=True):
             missing = np.flatnonzero(~maker.any(axis=1))
             if len(missing):
@@ -129,22 +144,32 @@ class Study:
                     f"groups: {name!r} has no trial of {label!r} in y: leave them out."
                 )
         maker = makers[1] - makers[0]
-        _check_units(len(maker))
         words = f"{labels[1]} less {labels[0]}, {len(maker)} people"
-        return cls(Design(np.ones((len(maker), 1)), flips=True), maker, None, None, labels, words)
+        return cls.of_differences(maker[np.newaxis], [labels], words)
+
+    @classmethod
+    def of_differences(cls, makers, labels, words, prefixes=("",)):
+        """Differences or slopes of people, whose mean is compared with 0."""
+        ones = np.ones((makers.shape[1], 1))
+        check_units(len(ones))
+        design, levels = Design(ones, flips=True), np.array([[0.0], [1.0]])
+        return cls(design, makers, labels, words, None, ones, levels, prefixes)
 
     @classmethod
     def _of_covariate(cls, covariate, persons, named):
         """A regression on what differs between people, or slopes of what differs within them."""
-        maker = _means(persons)
+        maker = means_of_people(persons)
         of_units = maker @ covariate
         within = covariate - of_units[persons]
         spread, between = np.sqrt(np.square(within).mean()), of_units.std()
-        if spread <= _OF_PEOPLE * between:
-            _check_units(len(maker))
+        if spread <= OF_PEOPLE * between:
+            check_units(len(maker))
             design = Design((of_units - of_units.mean())[:, np.newaxis])
             words = f"Regression, {_count_units(len(maker), len(covariate), named)}"
-            return cls(design, maker, None, of_units, [], words)
+            model = np.column_stack([np.ones(len(maker)), of_units])
+            levels = np.array([[0.0, 0.0], [0.0, 1.0]])
+            labels = [["the covariate"]]
+            return cls(design, maker[np.newaxis], labels, words, model=model, levels=levels)
         if spread < between:
             warnings.warn(
                 f"y differs by {spread:.3g} within people, and by {between:.3g} between them. "
@@ -155,12 +180,10 @@ class Study:
             )
         squares = np.bincount(persons, within**2)
         slopes = np.where(persons == np.arange(len(maker))[:, np.newaxis], within, 0)
-        varies = squares > np.square(_OF_PEOPLE * spread) * np.bincount(persons)
+        varies = squares > np.square(OF_PEOPLE * spread) * np.bincount(persons)
         maker = slopes[varies] / squares[varies, np.newaxis]
-        _check_units(len(maker))
-        design = Design(np.ones((len(maker), 1)), flips=True)
         words = f"Regression within {len(maker)} people"
-        return cls(design, maker, None, None, [], words)
+        return cls.of_differences(maker[np.newaxis], [["the covariate"]], words)
 
     @property
     def smallest_p(self):
@@ -169,46 +192,109 @@ class Study:
         With both signs flipped, with groups of one size exchanged, and with a symmetric covariate
         reversed, units differ as much.
         """
-        n = len(self.maker)
+        n = self.makers.shape[1]
         if self.design.flips:
             return 2 / 2**n
         if self.groups is not None:
             return self.design.floor
-        values = np.sort(self.covariate)
-        sizes = np.unique(values, return_counts=True)[1].tolist()
-        is_symmetric = np.allclose(values + values[::-1], values[0] + values[-1])
-        alike = 2 if is_symmetric else 1
+        rows = np.round(self.design.rows, 9)
+        sizes = np.unique(rows, axis=0, return_counts=True)[1].tolist()
+        ends = np.sort(rows, axis=0)
+        alike = 2 if np.allclose(ends, -ends[::-1], atol=1e-8) else 1
         return alike * math.prod(map(math.factorial, sizes)) / math.factorial(n)
 
-    def size(self, values, what):
-        """Direction in words, size, and its interval of 95 %, of a value a unit; NaN is unknown."""
-        is_known = ~np.isnan(values)
-        values = values[is_known]
-        if self.covariate is not None:
-            line = linregress(self.covariate[is_known], values)
-            return self._interval(line.slope, line.stderr, len(values) - 2, what, [])
+    def spread(self, values):
+        """In words, if people of one group vary twice as much in variance as those of another.
+
+        ``values`` (n_units, P, n_columns) count by their variance over all groups.
+        """
         if self.groups is None:
-            n = len(values)
-            error = values.std(ddof=1) / np.sqrt(n)
-            return self._interval(values.mean(), error, n - 1, what, self.labels)
-        of_groups = [values[self.groups[is_known] == k] for k in range(len(self.labels))]
-        means = [x.mean() for x in of_groups]
-        low, high = (0, 1) if len(means) == 2 else (first_smallest(means), first_largest(means))
-        a, b = of_groups[low], of_groups[high]
-        # Welch's test, for groups that vary differently.
-        shares = np.array([x.var(ddof=1) / len(x) for x in (a, b)])
-        degrees = np.sum(shares**2 / [len(a) - 1, len(b) - 1])
-        freedom = shares.sum() ** 2 / degrees if degrees else np.inf
-        labels = [self.labels[low], self.labels[high]]
-        return self._interval(b.mean() - a.mean(), np.sqrt(shares.sum()), freedom, what, labels)
+            return ""
+        variances = np.array(
+            [values[self.groups == k].var(axis=0, ddof=1) for k in range(self.n_levels)]
+        )
+        whole = variances.mean(axis=0)
+        shares = np.divide(variances, whole, out=np.ones_like(variances), where=whole > 0)
+        of_groups = shares.mean(axis=(1, 2))
+        low, high = first_smallest(of_groups), first_largest(of_groups)
+        ratio = of_groups[high] / max(of_groups[low], _LEAST_FACTOR)
+        if ratio < _UNEQUAL:
+            return ""
+        labels = self.labels[0]
+        return f", variance of {labels[high]} {ratio:.2g} times that of {labels[low]}"
+
+    def size(self, values, what, contrast=0):
+        """Direction in words, size, and its interval of 95 %, of a value a unit; NaN is unknown."""
+        labels, low, high = self.labels[contrast], 0, 1
+        if len(labels) > 2:
+            means = self._means_of_levels(values)
+            low, high = first_smallest(means), first_largest(means)
+        size, error, freedom = map(float, self.change(values, low, high))
+        words, *numbers = self._interval(size, error, freedom, what, self.pair(contrast, low, high))
+        prefix = self.prefixes[contrast]
+        return f"{prefix}: {words}" if prefix else words, *numbers
+
+    def pair(self, contrast, low, high):
+        """The labels of two levels of a contrast; of a slope what it is along."""
+        labels = self.labels[contrast]
+        return [labels[low], labels[high]] if len(labels) > 1 else labels
+
+    def called(self, contrast, low, high):
+        """A difference between two levels of a contrast in words."""
+        pair, prefix = self.pair(contrast, low, high), self.prefixes[contrast]
+        words = f"{pair[1]} less {pair[0]}" if len(pair) > 1 else f"slope with {pair[0]}"
+        return f"{prefix}: {words}" if prefix else words
+
+    @property
+    def n_levels(self):
+        """How many levels are compared."""
+        return len(self.levels) if self.groups is None else self.groups.max() + 1
+
+    def _means_of_levels(self, values):
+        """Of a value a unit."""
+        if self.groups is not None:
+            return [np.nanmean(values[self.groups == k]) for k in range(self.groups.max() + 1)]
+        is_known = ~np.isnan(values)
+        return self.levels @ np.linalg.lstsq(self.model[is_known], values[is_known], rcond=None)[0]
+
+    def change(self, values, low, high):
+        """From one level to another: its size, standard error and degrees of freedom.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n_units,) or (n_units, ...)
+            NaN, which is unknown, of single values only.
+        low, high : int
+            Levels.
+        """
+        is_known = ~np.isnan(values) if values.ndim == 1 else slice(None)
+        values = values[is_known]
+        if self.groups is not None:
+            # Welch's test, for groups that vary differently.
+            a, b = (values[self.groups[is_known] == k] for k in (low, high))
+            shares = np.stack([x.var(axis=0, ddof=1) / len(x) for x in (a, b)])
+            degrees = shares[0] ** 2 / (len(a) - 1) + shares[1] ** 2 / (len(b) - 1)
+            total = shares.sum(axis=0)
+            freedom = np.divide(
+                total**2, degrees, out=np.full_like(degrees, np.inf), where=degrees > 0
+            )
+            return b.mean(axis=0) - a.mean(axis=0), np.sqrt(total), freedom
+        columns, change = self.model[is_known], self.levels[high] - self.levels[low]
+        inverse = np.linalg.pinv(columns.T @ columns)
+        fitted = np.tensordot(inverse @ columns.T, values, 1)
+        freedom = len(values) - columns.shape[1]
+        squares = np.square(values - np.tensordot(columns, fitted, 1)).sum(axis=0)
+        error = np.sqrt(squares / freedom * (change @ inverse @ change))
+        return np.tensordot(change, fitted, 1), error, freedom
 
     def _interval(self, size, error, freedom, what, labels):
         half = student.ppf(0.975, freedom) * error
-        higher = "later" if what == "timing" else "above" if labels else "higher"
-        lower = "earlier" if what == "timing" else "below" if labels else "lower"
+        slope = len(labels) == 1
+        higher = "later" if what == "timing" else "higher" if slope else "above"
+        lower = "earlier" if what == "timing" else "lower" if slope else "below"
         word = higher if size > 0 else lower
         than = " than" if what == "timing" else ""
-        words = f"{labels[1]} {word}{than} {labels[0]}" if labels else f"{word} with the covariate"
+        words = f"{word} with {labels[0]}" if slope else f"{labels[1]} {word}{than} {labels[0]}"
         return words, size, size - half, size + half
 
 
@@ -244,7 +330,7 @@ class GroupsOfPeople:
             refuse_classes_as_people(codes, persons)
         makers, members_of, counts = [], [], []
         for k in range(len(labels)):
-            means = _means(persons, codes == k)
+            means = means_of_people(persons, codes == k)
             members = np.flatnonzero(means.any(axis=1))
             makers.append(means[members])
             members_of.append(members)
@@ -310,7 +396,7 @@ def band_of_mean(values, statistic, coverage):
     return values.mean(axis=0), spread
 
 
-def _means(persons, in_group=None):
+def means_of_people(persons, in_group=None):
     """The matrix whose product with values is the mean of each person, (n_people, n_sequences)."""
     belongs = persons == np.arange(persons.max() + 1)[:, np.newaxis]
     belongs = belongs if in_group is None else belongs & in_group
@@ -339,19 +425,32 @@ def _refuse_measures(y):
         )
 
 
-def _check_units(n):
+def check_people(groups, labels):
+    """Refuse groups of fewer than two people."""
+    counts = np.bincount(groups)
+    if counts.min() < 2:
+        of = ", ".join(f"{c} in {name!r}" for c, name in zip(counts, labels, strict=True))
+        raise ValueError(f"At least two people a group are needed, got {of}.")
+
+
+def check_units(n):
+    """Refuse too few people."""
     if n < _FEWEST:
         raise ValueError(f"At least {_FEWEST} people are needed, got {n}.")
 
 
-def _check_covariate(covariate, n):
-    values = as_numbers(covariate, "y", dtype=np.float64)
+def check_covariate(covariate, n, name="y"):
+    """The numbers of trials, if they are finite and differ."""
+    values = as_numbers(covariate, name, dtype=np.float64)
     if values.shape != (n,):
         raise ValueError(
-            f"y must have one number for each of {counted(n, 'trial')}, got shape {values.shape}."
+            f"{name} must have one number for each of {counted(n, 'trial')}, got shape "
+            f"{values.shape}."
         )
     if not np.isfinite(values).all() or np.ptp(values) == 0:
-        raise ValueError("y must be finite, and must differ between trials, if it is a covariate.")
+        raise ValueError(
+            f"{name} must be finite, and must differ between trials, if it is a covariate."
+        )
     return values
 
 
@@ -367,6 +466,9 @@ class Design:
         Centred, unless signs are flipped.
     flips : bool, default=False
         Whether the signs of rows are flipped, as of paired differences, instead of a permutation.
+    nuisance : ndarray, shape (n_units, n_others), default=None
+        Centred columns that are not tested. What is left of the units without them is permuted
+        (Freedman and Lane, *J. Business & Economic Statistics* 1, 1983).
 
     Attributes
     ----------
@@ -376,15 +478,18 @@ class Design:
 
     floor = 0.0
 
-    def __init__(self, columns, flips=False):
-        rows, triangle = np.linalg.qr(columns)
-        self.rows, self.flips = rows * np.sign(np.diagonal(triangle)), flips
-        self.left = len(columns) - columns.shape[1] - (not flips)
+    def __init__(self, columns, flips=False, nuisance=None):
+        self.flips, self.n_tested = flips, columns.shape[1]
+        self.nuisance = columns[:, :0] if nuisance is None else np.linalg.qr(nuisance)[0]
+        apart = columns - self.nuisance @ (self.nuisance.T @ columns)
+        rows, triangle = np.linalg.qr(apart)
+        self.rows = np.column_stack([rows * np.sign(np.diagonal(triangle)), self.nuisance])
+        self.left = len(columns) - self.rows.shape[1] - (not flips)
 
     def rearranged(self, order):
         """The same of units in another order."""
         design = copy(self)
-        design.rows = self.rows[order]
+        design.rows, design.nuisance = self.rows[order], self.nuisance[order]
         return design
 
     @property
@@ -394,6 +499,9 @@ class Design:
 
     def prepare(self, values):
         """What `deviates` takes of values (n_units, P, n_features)."""
+        if self.nuisance.size:
+            values = np.nan_to_num(values - np.nanmean(values, axis=0))
+            values -= np.tensordot(self.nuisance, np.tensordot(self.nuisance.T, values, 1), 1)
         return scaled(values, not self.flips)
 
     def permuted(self, random_state):
@@ -416,13 +524,24 @@ class Design:
         -------
         ndarray, shape (n_draws, P, n_features)
         """
-        k = rows.shape[2]
+        k = self.n_tested
         by_column = np.einsum("dnk,npf->dkpf", rows, units, optimize=True)
-        explained = np.minimum(np.square(by_column).sum(axis=1), 1 - _ROUNDING)
-        ratio = explained / (1 - explained) * (self.left / k)
+        squares = np.square(by_column)
+        # What the nuisance takes of units in another order does not count.
+        total = 1 - squares[:, k:].sum(axis=1)
+        explained = np.minimum(squares[:, :k].sum(axis=1), total * (1 - _ROUNDING))
+        ratio = explained / (total - explained) * (self.left / k)
         if k == 1:
             return self._of_t(np.sqrt(ratio) * np.sign(by_column[:, 0]))
         return self._of_f(ratio, k)
+
+    def critical(self, z, freedom):
+        """The t of any difference between levels, where a deviate z is that of all of them."""
+        k = self.n_tested
+        if k == 1:
+            return student.isf(norm.sf(z), freedom)
+        # Scheffe's method.
+        return np.sqrt(k * fisher.isf(norm.sf(z), k, freedom))
 
     def _of_t(self, t):
         return np.sign(t) * np.interp(np.abs(t), *_of_deviates(self.left))
@@ -610,6 +729,8 @@ class Family:
         Enhanced values of the design itself, with signs.
     largest : ndarray, shape (1 + n_permutations,)
         The largest absolute value of each draw, that of the design first.
+    peaks : ndarray, shape (1 + n_permutations,)
+        The largest absolute deviate of each draw, before enhancement.
     floor : float, default=0
         No p is below it.
 
@@ -619,8 +740,8 @@ class Family:
         The share of draws that are at least as large.
     """
 
-    def __init__(self, observed, largest, floor=0.0):
-        self.observed, self.largest, self.floor = observed, largest, floor
+    def __init__(self, observed, largest, peaks, floor=0.0):
+        self.observed, self.largest, self.peaks, self.floor = observed, largest, peaks, floor
         self.ranks = self.shares(largest)
 
     @property
@@ -653,7 +774,7 @@ def families(design, curves, n_permutations, random_state, *, by=(), n_jobs=None
     -------
     list of Family
     """
-    order = _order_of_values([curves[0], *by], design.flips)
+    order = order_of_values([curves[0], *by], design.flips)
     design, curves = design.rearranged(order), [values[order] for values in curves]
     draws = [design.observed, *(design.permuted(random_state) for _ in range(n_permutations))]
     portions = [np.stack(draws[k : k + _BATCH]) for k in range(0, len(draws), _BATCH)]
@@ -664,12 +785,12 @@ def families(design, curves, n_permutations, random_state, *, by=(), n_jobs=None
     n = len(portions)
     by_curves = [results[k : k + n] for k in range(0, len(results), n)]
     return [
-        Family(p[0][0], np.concatenate([largest for _, largest in p]), design.floor)
-        for p in by_curves
+        Family(of_curves[0][0], *np.hstack([draws[1:] for draws in of_curves]), design.floor)
+        for of_curves in by_curves
     ]
 
 
-def _order_of_values(curves, flips):
+def order_of_values(curves, flips):
     """The order of units by their values: draws depend on neither trials' order nor people's names.
 
     The last of several sets of curves counts first.
@@ -684,9 +805,10 @@ def _order_of_values(curves, flips):
 
 
 def _enhanced_draws(design, rows, units):
-    """Enhanced values of the first of some draws, and the largest absolute one of each."""
-    maps = enhanced(design.deviates(rows, units))
-    return maps[0], np.abs(maps).max(axis=(1, 2))
+    """Enhanced values of the first of some draws, and of each the largest, and largest deviate."""
+    deviates = design.deviates(rows, units)
+    maps = enhanced(deviates)
+    return maps[0], np.abs(maps).max(axis=(1, 2)), np.abs(deviates).max(axis=(1, 2))
 
 
 def share_at_most(draws, values):

@@ -90,7 +90,7 @@ def test_values_are_scaled_to_a_length_of_one_if_they_vary():
 
 
 def test_shares_of_draws_count_equal_ones():
-    family = Family(None, np.array([2.0, 1, 3, 2]))
+    family = Family(None, np.array([2.0, 1, 3, 2]), None)
     assert family.ranks.tolist() == [0.75, 1, 0.25, 0.75]
     assert family.p_value == 0.75
     assert share_at_most(family.ranks, [0.75, 0.5, 0.25]).tolist() == [0.75, 0.25, 0.25]
@@ -216,7 +216,7 @@ def test_p_of_one_value_and_the_smallest_are_shares_of_all_arrangements(y):
     arranged = of_all_arrangements(values, y)
     exact = np.mean(arranged >= arranged[0] - 1e-9)
     study, draws = Study.of(**given), np.random.RandomState(0)
-    curve, quiet = study.units(of_trials)[:, np.newaxis, np.newaxis], Progress(None, 0)
+    curve, quiet = study.units(of_trials[:, np.newaxis, np.newaxis]), Progress(None, 0)
     (family,) = families(study.design, [curve], 4999, draws, progress=quiet)
     # Groups may vary differently: their test has no exact p.
     if y is None or y.dtype.kind == "f":
@@ -434,14 +434,14 @@ def test_slopes_within_people_and_what_is_compared_in_words():
     given = {"covariate": True, "paired": False, "n": 11}
     within = Study.of(speed, people, **given)
     slopes = [stats.linregress(speed[people == k], values[people == k]).slope for k in (0, 2, 3, 4)]
-    np.testing.assert_allclose(within.units(values), slopes)
+    np.testing.assert_allclose(within.units(values[:, None, None])[:, 0, 0], slopes)
     assert within.words == "Regression within 4 people"
     # Means of equal numbers differ in their last bits.
     ages = np.repeat([0.1, 0.7, 0.3, 0.9], 3) * 1e7 / 7
     given = {"covariate": True, "paired": False, "n": 12}
     between = Study.of(ages, np.repeat(range(4), 3), **given)
     assert between.words == "Regression, 4 people"
-    np.testing.assert_allclose(between.units(ages), ages[::3])
+    np.testing.assert_allclose(between.units(ages[:, None, None])[:, 0, 0], ages[::3])
     assert Study.of(ages, None, **given).words == "Regression, 12 trials"
     given = {"y": [*"aabbcc"], "covariate": False, "paired": False, "n": 6}
     assert Study.of(**given, groups=range(6)).words == "a, b and c, 6 people of one trial each"

@@ -1,0 +1,214 @@
+"""Each effect of a study with several factors, against nested models and plain t tests."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+from scipy.ndimage import gaussian_filter1d
+from sklearn_motionsync import LinearSynchronizer
+from sklearn_motionsync.comparison import compare_effects, compare_groups
+from sklearn_motionsync.comparison.effects import studies_of
+from sklearn_motionsync.comparison.study import Study, families
+from sklearn_motionsync.utils.parallel import Progress
+
+N = 17
+GROUP, SEX = np.array(list("abcab" * 4))[:N], np.array(list("mffmmffmfmm" * 2))[:N]
+AGE = np.random.default_rng(3).uniform(20, 60, N)
+PEOPLE = {"group": GROUP, "sex": SEX, "age": AGE}
+COLUMNS = {
+    "age": [AGE - AGE.mean()],
+    "group": [1.0 * (x == GROUP) - (GROUP == "a") for x in "bc"],
+    "sex": [1.0 * (SEX == "f") - (SEX == "m")],
+}
+COLUMNS["group:sex"] = [a * COLUMNS["sex"][0] for a in COLUMNS["group"]]
+COLUMNS["sex:age"] = [COLUMNS["sex"][0] * COLUMNS["age"][0]]
+
+
+def deviate(study, values):
+    """Of the units as they are, for one value a trial and each contrast."""
+    units = study.units(values[:, np.newaxis, np.newaxis])
+    design = study.design
+    return design.deviates(design.observed[np.newaxis], design.prepare(units))[0, 0]
+
+
+def squares_left(columns, values):
+    model = np.column_stack([np.ones(len(values)), *columns])
+    return np.square(values - model @ np.linalg.lstsq(model, values, rcond=None)[0]).sum()
+
+
+@pytest.mark.parametrize(
+    ("formula", "effects"),
+    [
+        ("group + age", ["group", "age"]),
+        ("group * sex + age", ["group", "sex", "age", "group:sex"]),
+        ("sex*age", ["sex", "age", "sex:age"]),
+    ],
+)
+def test_effects_of_people_have_the_tails_of_nested_models(formula, effects):
+    values = np.random.default_rng(0).standard_normal(N) + 0.03 * AGE + 2 * (GROUP == "b")
+    studies = studies_of(PEOPLE, formula, None, N)
+    assert list(studies) == effects
+    columns = [column for effect in effects for column in COLUMNS[effect]]
+    left = squares_left(columns, values)
+    freedom = N - 1 - len(columns)
+    for effect in effects:
+        others = [column for other in effects if other != effect for column in COLUMNS[other]]
+        k = len(COLUMNS[effect])
+        f = (squares_left(others, values) - left) / k / (left / freedom)
+        z = deviate(studies[effect], values)[0]
+        # One column has a signed t; several have F, which below its median has the deviate 0.
+        tail = 2 * stats.norm.sf(abs(z)) if k == 1 else stats.norm.sf(z)
+        expected = stats.f.sf(f, k, freedom)
+        assert tail == pytest.approx(expected if k == 1 else min(expected, 0.5), rel=1e-3)
+
+
+def test_sizes_of_people_are_those_of_least_squares():
+    values = np.random.default_rng(1).standard_normal(N) + 2 * (SEX == "f") + 0.05 * AGE
+    studies = studies_of(PEOPLE, "sex + age", None, N)
+    model = np.column_stack([np.ones(N), SEX == "f", AGE])
+    fitted, left, *_ = np.linalg.lstsq(model, values, rcond=None)
+    errors = np.sqrt(np.diag(np.linalg.inv(model.T @ model)) * left[0] / (N - 3))
+    half = stats.t.ppf(0.975, N - 3) * errors
+    for name, k, words in (("sex", 1, "f above m"), ("age", 2, "higher with age")):
+        found, size, lower, upper = studies[name].size(values, "shape")
+        assert found == words
+        expected = [fitted[k], fitted[k] - half[k], fitted[k] + half[k]]
+        np.testing.assert_allclose([size, lower, upper], expected)
+
+
+def test_conditions_are_compared_two_by_two_in_each_person():
+    rng = np.random.default_rng(2)
+    person, condition = np.repeat(range(8), 6), np.array(list("abcabc") * 8)
+    values = rng.standard_normal(48) + rng.standard_normal(8)[person] + (condition == "c")
+    group = np.array(["x", "y"])[person % 2]
+    data = pd.DataFrame({"shoe": condition, "group": group})
+    studies = studies_of(data, "shoe * group", person, 48)
+    assert list(studies) == ["shoe", "group", "shoe:group"]
+    means = pd.Series(values).groupby([person, condition]).mean().unstack()
+    pairs = [("a", "b"), ("a", "c"), ("b", "c")]
+    changes = np.array([means[b] - means[a] for a, b in pairs])
+    of_group = Study.of(group[::6], None, covariate=False, paired=False, n=8)
+    z = deviate(studies["shoe:group"], values)
+    for k, (a, b) in enumerate(pairs):
+        # Between groups as compare_groups compares them, of which group is a plain column.
+        assert z[k] == pytest.approx(deviate(of_group, changes[k])[0])
+        words, size, *_ = studies["shoe"].size(changes[k], "shape", k)
+        assert words == f"{b} {'above' if size > 0 else 'below'} {a}"
+        assert studies["shoe:group"].size(changes[k], "timing", k)[0].startswith(f"{b} less {a}: y")
+    alone = studies_of(data, "shoe", person, 48)["shoe"]
+    z = deviate(alone, values)
+    expected = [stats.ttest_rel(means[b], means[a]).pvalue for a, b in pairs]
+    np.testing.assert_allclose(2 * stats.norm.sf(np.abs(z)), expected, rtol=1e-3)
+    mean = deviate(of_group, means.mean(axis=1).to_numpy())
+    assert deviate(studies["group"], values) == pytest.approx(mean)
+
+
+def test_two_conditions_cross_in_differences_of_differences():
+    person, n = np.repeat(range(5), 4), 20
+    data = {"shoe": ["old", "old", "new", "new"] * 5, "slope": ["up", "down"] * 10}
+    values = np.random.default_rng(4).standard_normal(n)
+    study = studies_of(data, "shoe * slope", person, n)["shoe:slope"]
+    old_up, old_down, new_up, new_down = values.reshape(5, 4).T
+    expected = (new_down - old_down) - (new_up - old_up)
+    np.testing.assert_allclose(study.units(values[:, None, None])[:, 0, 0], expected)
+    words, size, *_ = study.size(expected, "shape")
+    assert words == f"new less old: down {'above' if size > 0 else 'below'} up"
+
+
+def test_two_conditions_alone_are_pairs_of_compare_groups():
+    rng, t = np.random.default_rng(5), np.linspace(0, 1, 30)
+    person, y = np.repeat(range(7), 2), ["before", "after"] * 7
+    X = [np.sin(3 * t + rng.normal(0, 0.1) + 0.2 * (k % 2))[:, None] for k in range(14)]
+    match = LinearSynchronizer(30).fit(X).match(X)
+    pairs = compare_groups(match, X, y, groups=person, paired=True, n_permutations=199)
+    effects = compare_effects(match, X, {"when": y}, "when", groups=person, n_permutations=199)
+    assert list(effects) == ["when"]
+    assert effects["when"].p_shape == pairs.p_shape <= 0.05
+    columns = ["feature", "start", "end", "p", "direction", "size", "lower", "upper"]
+    pd.testing.assert_frame_equal(effects["when"].clusters[columns], pairs.clusters[columns])
+
+
+def test_bands_hold_intervals_of_welch_and_grow_with_what_is_held():
+    rng, t = np.random.default_rng(6), np.linspace(0, 1, 25)
+    y = np.array(list("aab" * 5))
+    spread = np.where(y == "a", 0.1, 0.3)
+    X = [np.outer(np.sin(3 * t + rng.normal(0, s)), [1, 2]) + rng.normal(0, s) for s in spread]
+    found = compare_groups(LinearSynchronizer(25).fit(X), X, y, n_permutations=199)
+    assert "15 trials, variance of b" in found.describe()
+    assert found.bands.groupby(["what", "feature"], sort=False).size().tolist() == [25, 25, 25]
+    assert set(found.bands["difference"]) == {"b less a"}
+    curves = np.array(X)
+    test = stats.ttest_ind(curves[y == "b"], curves[y == "a"], equal_var=False)
+    of_shape = found.bands[found.bands["what"] == "shape"]
+    for k, (_, band) in enumerate(of_shape.groupby("feature")):
+        np.testing.assert_allclose(band["time"], np.linspace(0, 100, 25))
+        interval = test.confidence_interval(0.9)
+        np.testing.assert_allclose(band["least"], interval.low[:, k])
+        np.testing.assert_allclose(band["most"], interval.high[:, k])
+        assert (band["lower"] < test.confidence_interval(0.95).low[:, k]).all()
+        largest = np.abs([interval.low[:, k], interval.high[:, k]]).max()
+        assert found.within().loc["shape", f"x{k}", "b less a"] == pytest.approx(largest)
+    # Several groups: each two of them.
+    y = np.array(list("abc" * 5))
+    found = compare_groups(LinearSynchronizer(25).fit(X), X, y, n_permutations=199, features=[0])
+    differences = found.bands.loc[found.bands["what"] == "shape", "difference"]
+    assert differences.unique().tolist() == ["b less a", "c less a", "c less b"]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "n", "n_studies"),
+    [
+        (3, (9, 5), 60),
+        pytest.param(1, (8, 8), 300, marks=pytest.mark.nightly),
+        pytest.param(3, (9, 5), 300, marks=pytest.mark.nightly),
+    ],
+)
+def test_bands_hold_the_true_difference_at_all_frames(ratio, n, n_studies):
+    """In 95 % of studies, with 199 permutations each, also if groups vary differently."""
+    group = np.repeat([0, 1], n)
+    study = Study.of(group.tolist(), None, covariate=False, paired=False, n=len(group))
+    truth = 1.5 * np.exp(-0.5 * np.square((np.arange(30) - 15) / 4))[:, np.newaxis]
+    held = []
+    for seed in range(n_studies):
+        rng = np.random.default_rng(seed)
+        noise = gaussian_filter1d(rng.standard_normal((len(group), 50, 1)), 4, axis=1)[:, 10:40]
+        values = noise * np.where(group, ratio, 1)[:, None, None] + group[:, None, None] * truth
+        (family,) = families(
+            study.design, [values], 199, np.random.RandomState(seed), progress=Progress(None, 0)
+        )
+        z = np.quantile(family.peaks, 0.95, method="higher")
+        size, error, freedom = study.change(values, 0, 1)
+        held.append((np.abs(size - truth) <= study.design.critical(z, freedom) * error).all())
+    error = np.sqrt(0.95 * 0.05 / n_studies)
+    assert np.mean(held) == pytest.approx(0.95, abs=3 * error)
+
+
+@pytest.mark.parametrize(
+    ("formula", "changed", "message"),
+    [
+        ("group + weight", {}, "'weight' is no column of data, which has 'group', 'sex', 'age'"),
+        ("group:sex", {}, "has group:sex without group: write group \\* sex"),
+        ("group + side", {"side": ["l", "r"] + ["l"] * (N - 2)}, "groups: 2 has no trial of r"),
+        (
+            "group + age",
+            {"age": AGE[:-1]},
+            "17 trials; its column 'age' has 16",
+        ),
+        (
+            "group + same",
+            {"same": [GROUP[1], *GROUP[1:]]},
+            "'group' cannot be told",
+        ),
+        ("sex", {"sex": ["f"] * N}, "all trials have 'f' in 'sex'"),
+        ("age", {"age": np.where(np.arange(N) == 0, 90, AGE)}, "'age' differs within people"),
+        ("age", {"age": [np.nan, *AGE[1:]]}, "must be finite"),
+    ],
+)
+def test_what_cannot_be_compared_is_told(formula, changed, message):
+    # Two trials are of one person, whose number is that of the second.
+    data = {name: np.array(values) for name, values in PEOPLE.items()}
+    for values in data.values():
+        values[0] = values[1]
+    data |= {name: np.array(values) for name, values in changed.items()}
+    with pytest.raises(ValueError, match=message):
+        studies_of(data, formula, [1, *range(1, N)], N)
