@@ -2,12 +2,11 @@
 
 from .measures import group_timing_error, keyframe_error
 from .scorers import FeatureHoldoutScorer, SpreadScorer
-from .spread import amplitude_phase_variance, least_squares
+from .spread import least_squares
 
 __all__ = [
     "FeatureHoldoutScorer",
     "SpreadScorer",
-    "amplitude_phase_variance",
     "group_timing_error",
     "keyframe_error",
     "least_squares",

@@ -81,19 +81,6 @@ def spread_ratio(before, after):
     return np.mean(ratios)
 
 
-def decomposition(before, after):
-    """The formulas of Kneip and Ramsay, curve by curve and feature by feature."""
-
-    def energy(z):
-        return np.mean([squared_distance(x, 0 * x) for x in z])
-
-    constant, mean = energy(before) / energy(after), after.mean(axis=0)
-    amplitude = constant * np.mean([squared_distance(y, mean) for y in after])
-    phase = constant * squared_distance(mean, 0 * mean) - energy([before.mean(axis=0)])
-    total = np.mean([squared_distance(x, before.mean(axis=0)) for x in before])
-    return amplitude, phase, total, phase / (amplitude + phase), constant
-
-
 # -- refused arguments --------------------------------------------------------------------
 
 FIVE = [[0, 1, 2, 3, 4.0]]
@@ -189,12 +176,4 @@ CASES = {
         + refusals(WRONG_KEYFRAMES, lambda k: (FIVE, *k)),
     ),
     "least_squares": Case(CURVES, spread_ratio, CURVE_REFUSALS),
-    "amplitude_phase_variance": Case(
-        CURVES,
-        decomposition,
-        [
-            CURVE_REFUSALS[0],
-            ((with_gap(NAN), CURVES[1]), {}, "before, trial 2, frame 7, feature 1 is NaN"),
-        ],
-    ),
 }
