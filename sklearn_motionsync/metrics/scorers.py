@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import inspect
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, clone
-from sklearn.utils import check_random_state
 from sklearn.utils.metadata_routing import UNUSED
 
 from ..inputs.keyframes import Keyframes
-from ..inputs.types import RandomState, TrialsLike
+from ..inputs.types import TrialsLike
 from ..matching.warps import normalise
 from ..utils.pipelines import accepted_params, route_to_synchronizer
 from .spread import least_squares
+
+# Folds that features are divided into, and the seed of their order.
+_FOLDS, _SEED = 3, 0
 
 
 class _SynchronizerScorer(BaseEstimator):
@@ -45,7 +46,7 @@ class _SynchronizerScorer(BaseEstimator):
         estimator : synchronizer or Pipeline
             Fitted; the pipeline has a synchronizer.
         X : list of arrays, 3-D array or DataFrame
-            At least two trials, as for the estimator; to hold features out, of at least ``n_folds``
+            At least two trials, as for the estimator; to hold features out, of at least two
             features.
         y : ignored
             Present for API consistency.
@@ -119,17 +120,10 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
     before the synchronizer count. To judge a fitted pattern by people held out, use `SpreadScorer`,
     or `group_timing_error` where the true moments are known.
 
-    Features are divided into ``n_folds`` folds. For each fold a clone is fitted without it, to a
-    median pattern. Its warps are scored by the spread of the fold alone, `least_squares` negated,
-    which over-warping does not reduce. The clones are given the key-frames of the trials that
-    are scored, but for those that none of these has.
-
-    Parameters
-    ----------
-    n_folds : int, default=3
-        At least 2, and at most the number of features.
-    random_state : int, RandomState instance or None, default=0
-        Determines the folds.
+    Features are divided into three folds, always the same ones; two features into two. For each
+    fold a clone is fitted without it, to a median pattern. Its warps are scored by the spread of
+    the fold alone, `least_squares` negated, which over-warping does not reduce. The clones are
+    given the key-frames of the trials that are scored, but for those that none of these has.
 
     Examples
     --------
@@ -147,23 +141,14 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
 
     _uses = "match", "fit"
 
-    def __init__(
-        self,
-        n_folds: int = 3,
-        random_state: RandomState = 0,
-    ) -> None:
-        self.n_folds = n_folds
-        self.random_state = random_state
-
     def _score(self, reached, params):
         """The mean score of the folds, each by clones that are fitted without it."""
         synchronizer, trials = reached.synchronizer, reached.trials
         n_features = trials[0].shape[1]
-        if not isinstance(self.n_folds, Integral) or not 2 <= self.n_folds <= n_features:
+        if n_features < 2:
             raise ValueError(
-                f"n_folds={self.n_folds!r} must be a whole number from 2 to the number of features "
-                f"of these trials, {n_features}, some of which are held out. Of a single feature, "
-                "as of the rows of a 2-D array, use SpreadScorer."
+                "FeatureHoldoutScorer holds features out, and these trials have a single one. Of a "
+                "single feature, as of the rows of a 2-D array, use SpreadScorer."
             )
         if len(inspect.signature(synchronizer.match).parameters) > 1:
             # Metadata that the estimator needs are missing for its clones, too.
@@ -172,9 +157,9 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         fit_params, match_params = (
             accepted_params(method, params) for method in (synchronizer.fit, synchronizer.match)
         )
-        order = check_random_state(self.random_state).permutation(n_features)
+        order = np.random.RandomState(_SEED).permutation(n_features)
         scores = []
-        for held_out in np.array_split(order, self.n_folds):
+        for held_out in np.array_split(order, min(_FOLDS, n_features)):
             shown = np.setdiff1d(order, held_out)
             refitted = clone(synchronizer).set_params(
                 n_frames=synchronizer.n_frames_, pattern="median"

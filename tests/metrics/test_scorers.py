@@ -167,8 +167,8 @@ def test_metadata_may_have_any_name(scorer, bunch, points):
             scorer()(sync, points, events=K, weights=weights)
     else:
         sync.seen.clear()
-        scorer(n_folds=2)(sync, points, events=K, weights=weights)
-        assert [w is weights for w in sync.seen] == [True, True]
+        scorer()(sync, points, events=K, weights=weights)
+        assert [w is weights for w in sync.seen] == [True, True, True]
 
 
 # -- key-frames routed by scikit-learn ----------------------------------------------------
@@ -232,20 +232,11 @@ def test_holdout_refuses_one_feature():
     assert SpreadScorer()(sync, rows) == -1
 
 
-@pytest.mark.parametrize("n_folds", [1, 7, 2.5, "3", None])
-def test_holdout_refuses_wrong_n_folds(n_folds, points):
-    sync = LinearSynchronizer(40).fit(points)
-    with pytest.raises(
-        ValueError, match=f"n_folds={n_folds!r} must be a whole number from 2 to .* 6,"
-    ):
-        FeatureHoldoutScorer(n_folds=n_folds)(sync, points)
-
-
 def test_score_of_constant_features_is_minus_1(points):
     """Interpolation does not turn a constant into noise."""
     X = [np.full((len(x), 2), 0.1, "f4") for x in points]
     sync = DenseSynchronizer(40).fit(X)
-    assert SpreadScorer()(sync, X) == FeatureHoldoutScorer(2)(sync, X) == -1
+    assert SpreadScorer()(sync, X) == FeatureHoldoutScorer()(sync, X) == -1
 
 
 # -- gaps -----------------------------------------------------------------------------------

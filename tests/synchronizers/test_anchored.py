@@ -219,7 +219,7 @@ def test_forms_of_keyframes_are_one(form):
 @pytest.mark.parametrize(
     ("sync", "scorer", "form"),
     [
-        (DenseSynchronizer(40), FeatureHoldoutScorer(n_folds=2), "array of arrays"),
+        (DenseSynchronizer(40), FeatureHoldoutScorer(), "array of arrays"),
         (LinearSynchronizer(40), SpreadScorer(), "labelled table"),
     ],
 )
@@ -247,7 +247,7 @@ def test_features_are_held_out_where_a_fold_lacks_labels(known):
     few[:, known] = ALL[:4, known]
     given = {"keyframes": few[:, known]} if known else {}
     plain = DenseSynchronizer(40).fit(X, **({"keyframes": ALL[:, known]} if known else {}))
-    scorer = FeatureHoldoutScorer(n_folds=2)
+    scorer = FeatureHoldoutScorer()
     expected = scorer(plain, X[:4], **given)
     assert scorer(sync, X[:4], keyframes=few) == expected
     seconds = {"keyframes": few / 100, "frame_rate": 100}
