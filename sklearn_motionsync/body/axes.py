@@ -268,21 +268,20 @@ def estimate_up(positions, skeleton):
     return _nearest_axis(rise)
 
 
-def check_upright(heights, points, lengths, skeleton, what):
+def check_upright(points, lengths, skeleton, what):
     """Refuse a body that is upside down from the first to the last frame.
 
     Parameters
     ----------
-    heights : ndarray, shape (n_frames, 15)
-        Of the landmarks; NaN where they are hidden.
-    points : callable
-        Gives the landmarks, (n_frames, 15, n_dims), the second axis vertical. Few bodies need them.
+    points : ndarray, shape (n_frames, 15, n_dims)
+        The landmarks, the second axis vertical; NaN where they are hidden.
     lengths : ndarray, shape (n_frames, 12)
         Of the limbs.
     skeleton : Skeleton
     what : str
         The subject of the message, with a capital letter.
     """
+    heights = points[:, :, 1]
     never_seen = np.isnan(heights).all(axis=0)
     seen = [name for name in skeleton.landmarks if not never_seen[LANDMARKS.index(name)]]
     lower, middle, upper = _levels(heights, seen)
@@ -304,7 +303,7 @@ def check_upright(heights, points, lengths, skeleton, what):
     is_symmetric = all(max(pair) < _LARGEST_ASYMMETRY * min(pair) for pair in pairs)
     if np.quantile(rises, _MOST_FRAMES) >= -margin or not is_symmetric:
         return
-    lower, middle, upper = _levels(points(), seen)
+    lower, middle, upper = _levels(points, seen)
     bottom, top = (middle, upper) if lower is None else (lower, middle)
     trunk = [] if upper is None else _seen_rises(middle, upper)
     if len(trunk) and trunk[:, 1].mean() > -margin:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import warnings
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -37,58 +37,14 @@ from .limbs import (
     scale_missing_lengths,
 )
 
-# Frames whose points are computed at a time: they stay in the cache.
-PORTION = 4096
-
 
 def mask_hidden(points):
     """Make points (n_frames, n, n_dims) NaN, in place, of which a coordinate is NaN."""
     points[np.isnan(points).any(axis=2)] = np.nan
 
 
-class Portion(NamedTuple):
-    """Some frames of a body, y up.
-
-    Attributes
-    ----------
-    points : ndarray, shape (n_frames, 15, n_dims)
-        The landmarks; 0 if the skeleton lacks them, NaN where they are hidden.
-    limbs : ndarray, shape (n_frames, 12, n_dims)
-        The limbs; 0 if the skeleton lacks them, NaN where an end is hidden.
-    lengths : ndarray, shape (n_frames, 12)
-        Lengths of the limbs; 0 if the skeleton lacks them, and for hips and shoulders that a
-        picture shows end-on; NaN where they are hidden.
-    left : ndarray, shape (n_frames, 3), or None
-        Directions to the left that give the heading; NaN before the first. None in the plane, and
-        without hips and shoulders.
-    """
-
-    points: np.ndarray
-    limbs: np.ndarray
-    lengths: np.ndarray
-    left: np.ndarray | None
-
-    def position_of(self, landmark):
-        """Positions (n_frames, n_dims) of a landmark."""
-        return self.points[:, LANDMARKS.index(landmark)]
-
-    @property
-    def directions(self):
-        """Limbs (n_frames, 12, n_dims) divided by their length; 0 without a length."""
-        return self.limbs / np.where(self.lengths > 0, self.lengths, 1)[:, :, np.newaxis]
-
-    @property
-    def axes(self):
-        """Axes (n_frames, 3, 3) that turn with the body: rows x to the left, y up, z forward."""
-        if self.left is None:
-            return None
-        axes = heading_axes(self.left)
-        axes[np.isnan(self.left[:, 0])] = np.nan
-        return axes
-
-
 class Body:
-    """The body of a trial, checked, of which few frames are computed at a time.
+    """The body of a trial, y up, checked.
 
     Parameters
     ----------
@@ -101,80 +57,66 @@ class Body:
 
     Attributes
     ----------
+    points : ndarray, shape (n_frames, 15, n_dims)
+        The landmarks; 0 if the skeleton lacks them, NaN where they are hidden.
+    limbs : ndarray, shape (n_frames, 12, n_dims)
+        The limbs; 0 if the skeleton lacks them, NaN where an end is hidden.
     lengths : ndarray, shape (n_frames, 12)
-        As of `Portion`.
+        Lengths of the limbs; 0 if the skeleton lacks them, and for hips and shoulders that a
+        picture shows end-on; NaN where they are hidden.
     floor : float
         The smallest height of an ankle; NaN if all are hidden.
     """
 
     def __init__(self, positions, skeleton, hides, called):
-        self._positions, self._skeleton, self._hides = positions, skeleton, hides
-        n_frames = len(positions)
-        self._slices = [slice(k, k + PORTION) for k in range(0, n_frames, PORTION)]
-        self._held = None
-        self.lengths = np.empty((n_frames, len(LIMB_NAMES)), positions.dtype)
-        heights = np.empty((n_frames, len(LANDMARKS)), positions.dtype)
-        largest = 0
-        for rows in self._slices:
-            points, limbs = self._held = self._points_and_limbs(rows)
-            self.lengths[rows] = np.linalg.norm(limbs, axis=2)
-            heights[rows] = points[:, :, 1]
-            largest = np.fmax.reduce(np.abs(points), axis=None, initial=largest)
-        self._check_lengths(largest, called)
-        check_upright(heights, self._all_points, self.lengths, skeleton, called)
+        self._skeleton = skeleton
+        self.points = to_y_up(landmark_positions(positions, skeleton), skeleton)
+        if hides:
+            mask_hidden(self.points)
+        self.limbs = limb_vectors(self.points)
+        self.lengths = np.linalg.norm(self.limbs, axis=2)
+        self._check_lengths(called)
+        check_upright(self.points, self.lengths, skeleton, called)
+        self.limbs[self.lengths == 0] = 0
         ankles = [f"{side}_ankle" for side in SIDES if f"{side}_ankle" in skeleton.landmarks]
-        self.floor = lowest_height([heights[:, LANDMARKS.index(name)] for name in ankles])
-        self._lateral = [
-            LIMB_NAMES.index(name)
-            for name in LATERAL_LIMBS
-            if name in skeleton.limbs and skeleton.n_dims == 3
-        ]
-        self._left = self._left_in_gaps()
+        self.floor = lowest_height([self.position_of(name)[:, 1] for name in ankles])
 
     @functools.cached_property
     def median_lengths(self):
         """Medians (12,) of the lengths over the frames that show a limb; NaN without any."""
         return median_lengths(self.lengths)
 
-    def features(self, function, n_features):
-        """Features (n_frames, n_features) that a function gives for every portion."""
-        out = np.empty((len(self.lengths), n_features), self.lengths.dtype)
-        for rows in self._slices:
-            out[rows] = function(self._portion(rows), self)
-        return out
+    def position_of(self, landmark):
+        """Positions (n_frames, n_dims) of a landmark."""
+        return self.points[:, LANDMARKS.index(landmark)]
 
-    def _points_and_limbs(self, rows):
-        points = landmark_positions(self._positions[rows], self._skeleton)
-        points = to_y_up(points, self._skeleton)
-        if self._hides:
-            mask_hidden(points)
-        return points, limb_vectors(points)
+    @property
+    def directions(self):
+        """Limbs (n_frames, 12, n_dims) divided by their length; 0 without a length."""
+        return self.limbs / np.where(self.lengths > 0, self.lengths, 1)[:, :, np.newaxis]
 
-    def _all_points(self):
-        return np.concatenate([self._points_and_limbs(rows)[0] for rows in self._slices])
+    @property
+    def axes(self):
+        """Axes (n_frames, 3, 3) that turn with the body: rows x to the left, y up, z forward.
 
-    def _portion(self, rows):
-        held = self._held if len(self._slices) == 1 else self._points_and_limbs(rows)
-        (points, limbs), lengths = held, self.lengths[rows]
-        limbs[lengths == 0] = 0
-        left = None
-        if self._left is not None:
-            left = self._left[rows]
-        elif self._lateral:
-            left = limbs[:, self._lateral[0]] / lengths[:, self._lateral[0], np.newaxis]
-        return Portion(points, limbs, lengths, left)
-
-    def _left_in_gaps(self):
-        """Directions (n_frames, 3) to the left, if the first limb that gives them is hidden."""
-        if not self._lateral or not np.isnan(self.lengths[:, self._lateral[0]]).any():
+        None in the plane, and without hips and shoulders; NaN before the first heading.
+        """
+        names = [name for name in LATERAL_LIMBS if name in self._skeleton.limbs]
+        if not names or self._skeleton.n_dims == 2:
             return None
-        limbs = [self._points_and_limbs(rows)[1][:, self._lateral] for rows in self._slices]
-        directions = np.concatenate(limbs) / self.lengths[:, self._lateral, np.newaxis]
-        return fill_heading(*directions.swapaxes(0, 1))
+        places = [LIMB_NAMES.index(name) for name in names]
+        directions = self.limbs[:, places] / self.lengths[:, places, np.newaxis]
+        left = directions[:, 0]
+        if np.isnan(left).any():
+            left = fill_heading(*directions.swapaxes(0, 1))
+        axes = heading_axes(left)
+        axes[np.isnan(left[:, 0])] = np.nan
+        return axes
 
-    def _check_lengths(self, largest, called):
+    def _check_lengths(self, called):
         """Refuse limbs without length; those that are not there have length 0."""
         lengths, skeleton, limbs = self.lengths, self._skeleton, self._skeleton.limbs
+        largest = np.fmax.reduce(np.abs(self.points), axis=None, initial=0)
         # A shorter limb is rounding of the largest coordinate.
         zero = lengths <= np.finfo(lengths.dtype).eps * largest
         for k, name in enumerate(LIMB_NAMES):
@@ -198,8 +140,7 @@ class PositionsTransformer(LongWorkMixin, TrialTransformerMixin, BaseEstimator):
     """Base of the transformers that compute features of joint positions, body by body.
 
     A subclass has a ``skeleton``; ``hidden``, which is "raise" or "nan"; ``_names``, of its
-    features; and a ``_features(portion, body)`` that returns the features of a `Portion` of a
-    `Body`.
+    features; and a ``_features(body)`` that returns the features of a `Body`.
     """
 
     # What an error about NaN advises.
@@ -272,8 +213,7 @@ class PositionsTransformer(LongWorkMixin, TrialTransformerMixin, BaseEstimator):
         """
         check_is_fitted(self, "limb_lengths_")
         trials = self._check(X, reset=False)
-        bodies, n_features = (self._body(trials, i) for i in range(len(trials))), len(self._names)
-        features = [body.features(self._features, n_features) for body in bodies]
+        features = [self._features(self._body(trials, i)) for i in range(len(trials))]
         return restore(self, trials, features)
 
     def __sklearn_tags__(self):

@@ -238,9 +238,9 @@ class DirectionCosines(PositionsTransformer):
     def _names(self):
         return cosine_names(self.skeleton.limbs, self.skeleton.n_dims, self.skeleton.has_height)
 
-    def _features(self, portion, body):
-        limbs, cosines = self.skeleton.limbs, portion.directions
-        axes = portion.axes if self.reference != "world" else None
+    def _features(self, body):
+        limbs, cosines = self.skeleton.limbs, body.directions
+        axes = body.axes if self.reference != "world" else None
         if axes is not None:
             cosines = project_on_axes(cosines, axes)
         if self.reference == "parent":
@@ -248,7 +248,7 @@ class DirectionCosines(PositionsTransformer):
         cosines = cosines[:, limb_indices(limbs)].reshape(len(cosines), -1)
         if not self.skeleton.has_height:
             return cosines
-        heights = (portion.position_of("pelvis")[:, 1] - body.floor) / self._size_of(body)
+        heights = (body.position_of("pelvis")[:, 1] - body.floor) / self._size_of(body)
         return np.column_stack([heights, cosines])
 
     def _positions(self, trials, i):

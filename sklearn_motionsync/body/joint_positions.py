@@ -118,12 +118,12 @@ class JointPositions(PositionsTransformer):
         origin = _origin_of(self.skeleton)
         return [name for name in self.skeleton.landmarks if [name] != origin]
 
-    def _features(self, portion, body):
-        origin = [portion.position_of(name) for name in _origin_of(self.skeleton)]
+    def _features(self, body):
+        origin = [body.position_of(name) for name in _origin_of(self.skeleton)]
         # The pelvis is the first landmark, and the origin if it is there.
         middle = (sum(origin) / len(origin))[:, np.newaxis]
-        places = (portion.points[:, 1:] - middle) / self._size_of(body)
-        axes = portion.axes if self.reference == "heading" else None
+        places = (body.points[:, 1:] - middle) / self._size_of(body)
+        axes = body.axes if self.reference == "heading" else None
         if axes is not None:
             places = project_on_axes(places, axes)
         places = places[:, [LANDMARKS.index(name) - 1 for name in self._landmarks]]
