@@ -145,28 +145,4 @@ FORMATS = {
         """PELO TRXO HEDO LSJC LEJC LWJC LHJC LKJC LAJC RSJC REJC RWJC RHJC RKJC RAJC""",
         up="z",
     ),
-    "optitrack": _format(
-        "The 21 bones of OptiTrack's Motive.",
-        """Hip >Ab >Chest >Neck >Head LShoulder<Chest >LUArm >LFArm >LHand RShoulder<Chest >RUArm
-        >RFArm >RHand LThigh<Hip >LShin >LFoot >LToe RThigh<Hip >RShin >RFoot >RToe""",
-        """Hip Neck Head LUArm LFArm LHand LThigh LShin LFoot
-        RUArm RFArm RHand RThigh RShin RFoot""",
-    ),
-    "unreal": _format(
-        "The body of Unreal Engine's mannequin, 22 bones.",
-        """pelvis >spine_01 >spine_02 >spine_03 >clavicle_l >upperarm_l >lowerarm_l >hand_l
-        clavicle_r<spine_03 >upperarm_r >lowerarm_r >hand_r neck_01<spine_03 >head thigh_l<pelvis
-        >calf_l >foot_l >ball_l thigh_r<pelvis >calf_r >foot_r >ball_r""",
-        """pelvis neck_01 head upperarm_l lowerarm_l hand_l thigh_l calf_l foot_l upperarm_r
-        lowerarm_r hand_r thigh_r calf_r foot_r""",
-        up="z",
-    ),
-    "opencap": _format(
-        "The 20 video key-points of OpenCap, without a head.",
-        """Neck<midHip >RShoulder >RElbow >RWrist LShoulder<Neck >LElbow >LWrist midHip >RHip >RKnee
-        >RAnkle LHip<midHip >LKnee >LAnkle >LBigToe >LSmallToe LHeel<LAnkle RBigToe<RAnkle
-        >RSmallToe RHeel<RAnkle""",
-        """midHip Neck - LShoulder LElbow LWrist LHip LKnee LAnkle RShoulder RElbow RWrist RHip
-        RKnee RAnkle""",
-    ),
 }

@@ -121,12 +121,9 @@ class Skeleton:
     kinect: ClassVar[_Constructor]
     kinect_v2: ClassVar[_Constructor]
     mediapipe: ClassVar[_Constructor]
-    opencap: ClassVar[_Constructor]
     openpose: ClassVar[_Constructor]
-    optitrack: ClassVar[_Constructor]
     paper: ClassVar[_Constructor]
     plug_in_gait: ClassVar[_Constructor]
-    unreal: ClassVar[_Constructor]
 
     if TYPE_CHECKING:
 

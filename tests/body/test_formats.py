@@ -39,10 +39,7 @@ EXPECTED = {
         "-y",
         {"pelvis": ("left_hip", "right_hip"), "head": "nose", "left_wrist": "left_wrist"},
     ),
-    "opencap": (20, {0: "Neck", 7: "midHip"}, "y", {"pelvis": "midHip", "right_knee": "RKnee"}),
     "plug_in_gait": (15, {0: "PELO", 1: "LHJC"}, "z", {"left_elbow": "LEJC", "neck": "TRXO"}),
-    "optitrack": (21, {0: "Hip", 6: "LUArm"}, "y", {"left_elbow": "LFArm", "left_knee": "LShin"}),
-    "unreal": (22, {0: "pelvis"}, "z", {"neck": "neck_01", "right_elbow": "lowerarm_r"}),
 }  # fmt: skip
 
 
@@ -54,7 +51,7 @@ def test_joints_landmarks_axes_and_repr(name):
     assert (len(skeleton.joints), skeleton.up, skeleton.n_dims) == (count, up, 3)
     assert {j: skeleton.joints[j] for j in places} == places
     assert skeleton.landmarks == {**skeleton.landmarks, **landmarks}
-    assert len(skeleton.limbs) == (11 if name == "opencap" else 12)
+    assert len(skeleton.limbs) == 12
     assert skeleton.parents.count(-1) <= 3
     picture, other = (getattr(Skeleton, name)(**each) for each in ({"n_dims": 2}, {"up": "-x"}))
     assert (picture.joints, picture.landmarks) == (skeleton.joints, skeleton.landmarks)

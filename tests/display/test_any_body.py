@@ -105,7 +105,7 @@ def test_positions_in_a_plane_are_not_turned():
         np.testing.assert_allclose(head, body[PAPER.joints.index("head")])
 
 
-@pytest.mark.parametrize("name", ["openpose", "coco", "mediapipe", "plug_in_gait", "unreal"])
+@pytest.mark.parametrize("name", ["openpose", "coco", "mediapipe", "plug_in_gait"])
 @pytest.mark.parametrize("n_dims", [3, 2])
 def test_every_format_is_drawn(name, n_dims):
     skeleton = getattr(Skeleton, name)(n_dims=n_dims)

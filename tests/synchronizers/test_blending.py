@@ -20,7 +20,7 @@ import made_bodies
 from made_bodies import turned, with_still_root
 
 PAPER = Skeleton.paper()
-FORMATS = ("paper", "acclaim", "kinect", "kinect_v2", "mediapipe", "plug_in_gait", "unreal")
+FORMATS = ("paper", "acclaim", "kinect", "kinect_v2", "mediapipe", "plug_in_gait")
 
 
 @pytest.fixture(scope="module")
