@@ -14,8 +14,6 @@ from ..matching.gaps import is_gappy
 # NumPy scalars that equal Python ones, as which they are kept.
 _SCALARS = np.str_, np.number, np.bool_
 _NOT_LISTS = str, bytes, Mapping, Set
-# Kinds of the dtypes of dates and durations.
-_DATES = "Mm"
 
 
 def encode_groups(
@@ -135,14 +133,7 @@ def encode_classes(y, trials, estimator_name):
     column = column_or_1d(y, warn=True)
     check_consistent_length(trials, column)
     # Of the input: an array of mixed types would be one of text.
-    given = _check_labels(np.asarray(y, dtype=object).ravel(), "y")
-    if column.dtype.kind not in _DATES:
-        for i, (held, label) in enumerate(zip(column.tolist(), given, strict=True)):
-            if held != label:
-                raise ValueError(
-                    f"y[{i}] is {label!r}, which is {held!r} in an array of dtype {column.dtype}: "
-                    "give labels of one type, such as text."
-                )
+    _check_labels(np.asarray(y, dtype=object).ravel(), "y")
     assert_all_finite(column, input_name="y")
     check_classification_targets(column)
     classes, codes = np.unique(column, return_inverse=True)

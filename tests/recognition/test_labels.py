@@ -75,16 +75,9 @@ def test_rejected_trials_never_have_a_class(name):
         (["p"] * 5 + [3] * 5, r"y\[5\] is 3, y\[0\] is 'p': labels must be of one type"),
         ([3] * 5 + ["p"] * 5, r"y\[5\] is 'p', y\[0\] is 3: labels must be of one type"),
         (np.array(["p"] * 5 + [3] * 5, dtype=object), "labels must be of one type"),
-        ([2**63 + 1] * 5 + [-1] * 5, r"y\[0\] is 9223372036854775809, which is 9.22.*float64"),
-        ([2**53 + 1] * 5 + [2.0] * 5, r"y\[0\] is 9007199254740993, which is 9007199254740992.0"),
-        (
-            pd.array([2**53 + 1] * 5 + [2] * 5, dtype="Int64"),
-            r"y\[0\] is 9007199254740993, which is",
-        ),
-        (["a"] * 5 + ["a\0"] * 5, r"y\[5\] is 'a\\x00', which is 'a' in an array of dtype <U2"),
         (np.array(["2020-01-01"] * 5 + ["NaT"] * 5, "M8[ns]"), r"y\[5\] is missing"),
     ],
 )
-def test_labels_that_an_array_changes_are_refused(labels, message):
+def test_labels_of_several_types_or_missing_are_refused(labels, message):
     with pytest.raises(ValueError, match=message):
         ActionClassifier(n_frames=4).fit(X, labels)
