@@ -544,18 +544,39 @@ class Design:
         return np.sqrt(k * fisher.isf(norm.sf(z), k, freedom))
 
     def _of_t(self, t):
-        return np.sign(t) * np.interp(np.abs(t), *_of_deviates(self.left))
+        """Deviates of t, by a table that is even in a variable to which they are nearly linear."""
+        spacing, deviates, slopes = _deviates_of_t(self.left)
+        place = np.minimum(_even_in_t(t, self.left) / spacing, len(slopes))
+        before = np.minimum(place.astype(np.intp), len(slopes) - 1)
+        place -= before
+        place *= slopes.take(before)
+        place += deviates.take(before)
+        return np.copysign(place, t)
 
     def _of_f(self, ratio, k):
-        return np.interp(ratio, *_of_deviates(self.left, k))
+        deviates = np.linspace(0, _LARGEST, 8001)
+        return np.interp(ratio, _f_of_deviates(self.left, k), deviates)
+
+
+def _even_in_t(t, left):
+    """The variable of Wallace (*Ann. Math. Stat.* 30, 1959), to which deviates are nearly linear."""
+    return np.sqrt(left * np.log1p(np.square(t) / left))
 
 
 @lru_cache(maxsize=32)
-def _of_deviates(left, k=None):
-    """Values of t, or of F with k degrees of freedom, and the deviates with their tails, 0 to 8."""
+def _deviates_of_t(left):
+    """The spacing of an even table of deviates of t, 0 to 8, the deviates, and their differences."""
     deviates = np.linspace(0, _LARGEST, 8001)
-    tails = norm.sf(deviates)
-    return student.isf(tails, left) if k is None else fisher.isf(tails, k, left), deviates
+    places = _even_in_t(student.isf(norm.sf(deviates), left), left)
+    spacing = places[-1] / 4000
+    even = np.interp(spacing * np.arange(4001), places, deviates)
+    return spacing, even, np.diff(even)
+
+
+@lru_cache(maxsize=32)
+def _f_of_deviates(left, k):
+    """Values of F with k degrees of freedom, at deviates from 0 to 8."""
+    return fisher.isf(norm.sf(np.linspace(0, _LARGEST, 8001)), k, left)
 
 
 class GroupDesign(Design):
