@@ -12,16 +12,12 @@ from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, column_names
 from ..inputs.tables import as_pandas
 from ..inputs.types import Transformed, TrialsLike
-from .axes import UP_AXES, heading_axes, to_y_up
+from .axes import UP_AXES
 from .columns import check_columns, columns_of_skeleton, plain_positions
 from .formats import AXES, LANDMARKS
 from .landmarks import as_tuple, other_side
-from .limbs import LATERAL_LIMBS, LIMBS, unit_vectors
+from .limbs import LATERAL_LIMBS, LIMBS
 from .skeleton import Skeleton
-
-# A joint without a counterpart is on one side if it is never nearer to the median plane than this,
-# in widths of the hips or the shoulders.
-_OFF_CENTRE = 0.25
 
 
 def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
@@ -37,8 +33,8 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
         (n_frames_i, n_joints, n_dims), and tables the spellings of `Skeleton.from_frame`.
     skeleton : Skeleton
         The joints. Left and right joints are exchanged: those at a left and a right landmark, then
-        those whose names differ by "left" and "right", or "L" and "R". All others are in the
-        middle.
+        those whose names differ by "left" and "right", or "L" and "R". All others are mirrored
+        under their own names.
 
     Returns
     -------
@@ -51,7 +47,7 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
     ------
     ValueError
         If the width or the order of the columns is not that of the skeleton, or a joint is on one
-        side and has no counterpart.
+        side by its name or its landmark and has no counterpart.
 
     See Also
     --------
@@ -73,7 +69,7 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
             "mirror needs the Skeleton of the positions, such as Skeleton.from_frame(df); got "
             f"{type(skeleton).__name__}."
         )
-    counterparts, alone = _counterparts(skeleton)
+    counterparts = _counterparts(skeleton)
     # One array of several trials is mirrored as a whole.
     whole = isinstance(X, pd.DataFrame) or getattr(X, "ndim", 1) > 2
     one = whole or as_collection(X) is None
@@ -88,7 +84,6 @@ def mirror(X: TrialsLike, skeleton: Skeleton) -> Transformed:
         width = array.shape[-1] if array.ndim > 1 else 1
         check_columns(column_names(positions) or (), skeleton, f"Trial {i}", width)
         arrays.append(array.reshape(*array.shape[:-1], -1, skeleton.n_dims))
-    _check_middle(arrays, skeleton, alone)
     mirrored, lateral = [], UP_AXES[skeleton.n_dims][skeleton.up][0][0]
     for x, array in zip(parts, arrays, strict=True):
         image = array[..., counterparts, :]
@@ -123,19 +118,9 @@ def _as_kind_of(x, array, skeleton, counterparts):
 
 
 def _counterparts(skeleton):
-    """For each joint the index of its counterpart on the other side.
+    """For each joint the index of its counterpart on the other side, or its own without one.
 
-    Returns
-    -------
-    counterparts : list of int
-        A joint in the middle is its own counterpart.
-    alone : list of int
-        Joints without a counterpart that are no landmarks of the middle.
-
-    Raises
-    ------
-    ValueError
-        If a joint is on one side by its landmark or its name, and has no counterpart.
+    A joint that is on one side by its landmark or its name, and has no counterpart, is refused.
     """
     joints, landmarks = skeleton.joints, skeleton.landmarks
     pairs = [
@@ -159,22 +144,15 @@ def _counterparts(skeleton):
             for a, b in zip(left, right, strict=True):
                 other_of[a], other_of[b] = b, a
     middle = {j for name in LANDMARKS[:3] for j in as_tuple(landmarks.get(name, ()))}
-    alone = [joint for joint in joints if joint not in other_of and joint not in middle]
     for joint in joints:
         other = other_of.get(joint, joint)
         lacks = other == joint and (joint in sided or re.search("left|right", joint.lower()))
         if (lacks and joint not in middle) or other_of.get(other, other) != joint:
-            raise ValueError(_no_counterpart(joint, "on one side", joints))
-    return [joints.index(other_of.get(joint, joint)) for joint in joints], [
-        joints.index(joint) for joint in alone
-    ]
-
-
-def _no_counterpart(joint, where, joints):
-    return (
-        f"The joint {joint!r} is {where}, and has no counterpart on the other; the joints are "
-        f"{list(joints)}. Leave its columns out, or name both in the landmarks."
-    )
+            raise ValueError(
+                f"The joint {joint!r} is on one side, and has no counterpart on the other; the "
+                f"joints are {list(joints)}. Leave its columns out, or name both in the landmarks."
+            )
+    return [joints.index(other_of.get(joint, joint)) for joint in joints]
 
 
 def _find_by_name(joint, lower):
@@ -188,30 +166,6 @@ def _find_by_name(joint, lower):
         for match in re.finditer("(?<![a-z0-9])[lr]|[lr]$", name)
     ]
     return next((lower[other] for other in others if other != name and other in lower), None)
-
-
-def _check_middle(arrays, skeleton, alone):
-    """Refuse joints without a counterpart that are never near the median plane."""
-    pairs = [LIMBS[name][:2] for name in LATERAL_LIMBS if name in skeleton.limbs]
-    if not pairs or not alone or skeleton.n_dims == 2:
-        return
-    nearest = np.full(len(alone), np.inf)
-    for array in arrays:
-        points = to_y_up(array.reshape(-1, *array.shape[-2:]).astype(np.float64), skeleton)
-        right, left = (points[:, skeleton.indices_of(name)].mean(axis=1) for name in pairs[0])
-        seen = np.isfinite(left + right).all(axis=1)
-        points, left, right = points[seen], left[seen], right[seen]
-        lateral = heading_axes(unit_vectors(left - right))[:, 0]
-        width = np.linalg.norm(left - right, axis=1, keepdims=True)
-        from_middle = points[:, alone] - ((left + right) / 2)[:, np.newaxis]
-        distance = np.abs(np.einsum("fjd,fd->fj", from_middle, lateral))
-        distance = distance / np.where(width > 0, width, np.inf)
-        nearest = np.fmin(nearest, np.fmin.reduce(distance, axis=0, initial=np.inf))
-    # Joints that are never seen are at an infinite distance.
-    for joint, distance in zip(alone, nearest, strict=True):
-        if _OFF_CENTRE < distance < np.inf:
-            where = "on one side in every frame"
-            raise ValueError(_no_counterpart(skeleton.joints[joint], where, skeleton.joints))
 
 
 # -- the mirror image of cosines ------------------------------------------------------------

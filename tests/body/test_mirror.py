@@ -153,22 +153,10 @@ def test_landmarks_go_before_names():
         np.testing.assert_array_equal(found[f"{right}_y"], df[f"{left}_y"])
 
 
-def test_shoulders_show_the_middle_of_a_body_without_hips():
-    df = with_markers(["marker"])
-    df = df.drop(columns=[c for c in df if c.split("_")[1] in ("hip", "knee", "ankle")])
-    skeleton = Skeleton.from_frame(df)
-    assert "hip" not in skeleton.limbs
-    with pytest.raises(ValueError, match="'marker' is on one side in every frame"):
-        mirror(df, skeleton)
-    df[[f"marker_{a}" for a in "xyz"]] = df[[f"neck_{a}" for a in "xyz"]]
-    np.testing.assert_array_equal(mirror(df, skeleton)["marker_x"], -df["marker_x"])
-
-
-def test_joint_without_counterpart_is_in_the_middle_or_refused():
+def test_joint_without_counterpart_keeps_its_name_or_is_refused():
     df = with_markers(["RBAK", "C7"], middle=["C7"])
-    message = "'RBAK' is on one side in every frame, and has no counterpart"
-    with pytest.raises(ValueError, match=message):
-        mirror(df, Skeleton.from_frame(df))
+    found = mirror(df, Skeleton.from_frame(df))
+    np.testing.assert_array_equal(found[["RBAK_x", "C7_x"]], -df[["RBAK_x", "C7_x"]])
     df = with_markers(["left_toe"])
     with pytest.raises(ValueError, match=r"'left_toe' is on one side, .* Leave its columns out"):
         mirror(df, Skeleton.from_frame(df))
