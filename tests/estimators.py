@@ -60,10 +60,7 @@ INSTANCES = {
     "DenseSynchronizer": [DenseSynchronizer()],
     "PartSynchronizer": [PartSynchronizer({"first": [0]}, synchronizer=WHOLE)],
     "Synchronizer": [ShiftSynchronizer()],
-    "TimingChannel": [
-        TimingChannel(LinearSynchronizer()),
-        TimingChannel(QUICK, errors=True),
-    ],
+    "TimingChannel": [TimingChannel(LinearSynchronizer())],
     "ActionModel": [ActionModel()],
     "ActionDetector": [ActionDetector(make_pipeline(QUICK, ActionModel()))],
     "OnlineSynchronizer": [OnlineSynchronizer(LinearSynchronizer())],

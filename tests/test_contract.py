@@ -48,8 +48,7 @@ from shift_synchronizer import ShiftSynchronizer
 # Of few frames, so that the checks take less time.
 OF_FEW_FRAMES = ActionClassifier(n_landmarks=10, n_frames=2)
 # FrameWise is as wide as its transformer: tests/transformers/test_framewise.py checks several.
-# The instances of TimingChannel have the same interface, of which one is enough.
-OTHERWISE = [*BODY, *all_of("FrameWise", "ActionClassifier"), *INSTANCES["TimingChannel"][1:]]
+OTHERWISE = [*BODY, *all_of("FrameWise", "ActionClassifier")]
 ROW_ESTIMATORS = [e for e in ESTIMATORS if e not in OTHERWISE] + [OF_FEW_FRAMES]
 # What is checked in one place is tested whole on these two, one of rows and one of sequences.
 ROWS_AND_SEQUENCES = all_of("ASpace", "LinearSynchronizer")

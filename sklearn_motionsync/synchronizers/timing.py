@@ -22,17 +22,13 @@ from ..inputs.validation import restore
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import FRAME_RATE, validated_with_nested
 from .base import Synchronizer
-from .dense import DenseSynchronizer
-from .match import STANDARD, UNITS, Match, check_match
-from .parts import PartSynchronizer
+from .match import UNITS, Match, check_match
 from .training import with_confidence
 
-# The appended features: the offset, and its standard errors.
-_OFFSET, _ERROR = "offset", "offset_error"
+# The appended feature.
+_OFFSET = "offset"
 # Fitted attributes of the synchronizer that are also those of the channel.
 _SHARED = "n_frames_", "n_features_in_", "feature_names_in_", "_fitted_on_rows"
-# Synchronizers whose matches tell how sure they are.
-_TELLING = (DenseSynchronizer, PartSynchronizer)
 
 
 class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator):
@@ -50,10 +46,6 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         Unit of the offset: per cent of the clock, frames of the pattern, or seconds of each trial.
     frame_rate : float, default=None
         Frames per second of the trials, for seconds only.
-    errors : bool, default=False
-        Whether to append, after the offset, its standard error in its unit: half of the interval
-        that `Match.interval` gives for a coverage of 68.27 %. For a `DenseSynchronizer` or
-        `PartSynchronizer` only, whose matches tell how sure they are.
 
     Attributes
     ----------
@@ -76,10 +68,6 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
     The unit of the offset differs from those of the features. Scale them before they are combined,
     as in principal components.
 
-    Errors are 0 at both ends and at exact key-frames, where a warp is pinned, and nearly 0 for the
-    pattern itself. A weight of ``1 / error ** 2`` is then infinite. Add a variance to the square of
-    the error: that of the true offsets of the trials, or that of what is read off a frame.
-
     Metadata of the synchronizer, such as ``keyframes``, are arguments of ``fit`` and ``transform``;
     with scikit-learn's metadata routing they are requested by ``set_fit_request`` and
     ``set_transform_request`` of the synchronizer.
@@ -98,25 +86,12 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
     ['x0', 'offset']
     >>> channel.transform(X)[1, 50].round().tolist()  # the peak, and how late it is: 10 in truth
     [1.0, 9.0]
-
-    A mean offset in which trials under noise count less: their offsets are less sure.
-
-    >>> rng = np.random.default_rng(0)
-    >>> noise = np.repeat([0.02, 0.5], 4)[:, np.newaxis, np.newaxis]
-    >>> trials = X[1] + noise * rng.standard_normal((8, 101, 1))
-    >>> channel = TimingChannel(DenseSynchronizer(pattern=0), errors=True)
-    >>> offset, error = channel.fit([X[0], *trials]).transform(trials)[:, 50, 1:].T
-    >>> weights = 1 / (error**2 + 0.5**2)  # times are read to half of a per cent
-    >>> bool(weights[:4].min() > weights[4:].max())
-    True
-    >>> mean = np.average(offset, weights=weights)
     """
 
     _parameter_constraints: dict = {
         "synchronizer": [Synchronizer],
         "unit": [StrOptions(set(UNITS))],
         "frame_rate": [FRAME_RATE, None],
-        "errors": ["boolean"],
     }
 
     def __init__(
@@ -124,12 +99,10 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         synchronizer: Synchronizer,
         unit: Unit = "percent",
         frame_rate: float | None = None,
-        errors: bool = False,
     ) -> None:
         self.synchronizer = synchronizer
         self.unit = unit
         self.frame_rate = frame_rate
-        self.errors = errors
 
     @validated_with_nested
     def fit(self, X: TrialsLike, y: object = None, **params: Any) -> Self:
@@ -152,25 +125,16 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         Raises
         ------
         ValueError
-            If the frame rate for seconds is missing, errors are asked of a synchronizer whose
-            matches do not tell them, or a feature has the name of the offset or of the errors; and
+            If the frame rate for seconds is missing, or a feature has the name of the offset; and
             as from the ``fit`` of the synchronizer.
         """
         if self.unit == "seconds" and self.frame_rate is None:
             raise ValueError("unit='seconds' needs frame_rate, frames per second of X.")
-        if self.errors and not isinstance(self.synchronizer, _TELLING):
-            raise ValueError(
-                f"errors=True needs {' or '.join(kind.__name__ for kind in _TELLING)}, whose "
-                f"matches tell how sure they are; got {type(self.synchronizer).__name__}. Set "
-                "errors=False."
-            )
         sync, given = clone(self.synchronizer), self._route("fit", params)
         with self._progress(fits=True) as progress, progress.fitting(sync, "synchronizing"):
             sync.fit(X, y, **given)
-        for name in self._names_of_timing():
-            if name in getattr(sync, "feature_names_in_", ()):
-                what = "offset" if name == _OFFSET else "errors"
-                raise ValueError(f"A feature of X has the name of the {what}, {name!r}: rename it.")
+        if _OFFSET in getattr(sync, "feature_names_in_", ()):
+            raise ValueError(f"A feature of X has the name of the offset, {_OFFSET!r}: rename it.")
         self.__dict__.pop("feature_names_in_", None)
         shared = {name: value for name, value in vars(sync).items() if name in _SHARED}
         self.__dict__.update(shared, synchronizer_=sync)
@@ -191,7 +155,7 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features + 1)
-            As from ``transform``; one feature more with errors.
+            As from ``transform``.
         """
         if not _routes_metadata():
             return self.fit(X, y, **params).transform(X, **params)
@@ -214,9 +178,9 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features + 1)
-            The offset is the last feature; with errors they follow as one more. For 2-D input
-            ``(n_sequences, 2 P)``: each row is a curve, then its offset, then its errors. A
-            ``(trial, frame)`` frame under ``set_output(transform="pandas")``.
+            The offset is the last feature. For 2-D input ``(n_sequences, 2 P)``: each row is a
+            curve, then its offset. A ``(trial, frame)`` frame under
+            ``set_output(transform="pandas")``.
         """
         check_is_fitted(self)
         trials = self.synchronizer_.check_trials(X)
@@ -245,14 +209,10 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         hidden = None if match.reached is None else match.reached.trials.confidence
         curves = match.warp(with_confidence(trials, hidden))
         lengths = [len(x) for x in trials]
-        timing = [match.offsets_in(self.unit, lengths, self.frame_rate)]
-        if self.errors:
-            lower, upper = match.interval(STANDARD, self.unit, lengths, self.frame_rate)
-            timing.append((upper - lower) / 2)
-        timing = [feature.astype(curves.dtype) for feature in timing]
+        offsets = match.offsets_in(self.unit, lengths, self.frame_rate).astype(curves.dtype)
         if trials.kind == "rows":
-            return np.concatenate([curves[:, :, 0], *timing], axis=1)
-        out = np.concatenate([curves, np.stack(timing, axis=2)], axis=2)
+            return np.concatenate([curves[:, :, 0], offsets], axis=1)
+        out = np.concatenate([curves, offsets[:, :, np.newaxis]], axis=2)
         return restore(self, trials, out, frames=range(self.n_frames_))
 
     def match(self, X: TrialsLike, **params: Any) -> Match:
@@ -274,9 +234,7 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         return self.synchronizer_.match(X, **params)
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
-        """Names of the outputs: those of the synchronizer, then those of the offset.
-
-        These are ``"offset"``, and with errors ``"offset_error"``.
+        """Names of the outputs: those of the synchronizer, then ``"offset"``.
 
         Parameters
         ----------
@@ -286,14 +244,13 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         Returns
         -------
         ndarray of str
-            For 2-D input a name for each frame of the curve, then for each of the offset, and of
-            the errors.
+            For 2-D input a name for each frame of the curve, then for each of the offset.
         """
         check_is_fitted(self)
         names = self.synchronizer_.get_feature_names_out(input_features)
-        of_timing = self._names_of_timing()
+        of_timing = [_OFFSET]
         if self._fitted_on_rows:
-            of_timing = [f"{name}{p}" for name in of_timing for p in range(self.n_frames_)]
+            of_timing = [f"{_OFFSET}{p}" for p in range(self.n_frames_)]
         return np.concatenate([names, np.asarray(of_timing, dtype=object)])
 
     def get_metadata_routing(self):
@@ -318,10 +275,6 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         tags.input_tags.allow_nan = get_tags(self.synchronizer).input_tags.allow_nan
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
-
-    def _names_of_timing(self):
-        """The names of the appended features."""
-        return [_OFFSET, _ERROR] if self.errors else [_OFFSET]
 
     def _route(self, method, params):
         """The metadata that a method of the synchronizer is given."""

@@ -14,7 +14,6 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     Match,
-    PartSynchronizer,
     TimingChannel,
 )
 from sklearn_motionsync.datasets import make_bending
@@ -43,7 +42,6 @@ def pipes(bunch):
     return [pipe.fit(bunch.data) for pipe in made]
 
 
-@pytest.mark.parametrize("errors", [False, True])
 @pytest.mark.parametrize(
     ("params", "clock"),
     [
@@ -52,34 +50,27 @@ def pipes(bunch):
         ({"unit": "seconds", "frame_rate": 50}, ("seconds", 50)),
     ],
 )
-def test_offset_and_its_error_are_the_last_features(points, params, clock, errors):
+def test_the_offset_is_the_last_feature(points, params, clock):
     synchronizer = DenseSynchronizer(30).fit(points)
-    channel = TimingChannel(DenseSynchronizer(30), errors=errors, **params).fit(points)
+    channel = TimingChannel(DenseSynchronizer(30), **params).fit(points)
     out, match = channel.transform(points), synchronizer.match(points)
     np.testing.assert_array_equal(out[:, :, :3], synchronizer.transform(points))
     expected = match.offsets_in(clock[0], points, *clock[1:])
     np.testing.assert_array_equal(out[:, :, 3], expected)
-    names = ["x0", "x1", "x2", "offset", *["offset_error"] * errors]
-    assert channel.get_feature_names_out().tolist() == names
-    if errors:
-        lower, upper = match.interval(0.6827, clock[0], points, *clock[1:])
-        np.testing.assert_allclose(out[:, :, 4], (upper - lower) / 2)
+    assert channel.get_feature_names_out().tolist() == ["x0", "x1", "x2", "offset"]
     single = channel.fit_transform([x.astype(np.float32) for x in points])
-    assert (single.dtype, single.shape) == (np.float32, (7, 30, len(names)))
+    assert (single.dtype, single.shape) == (np.float32, (7, 30, 4))
 
 
-def test_rows_give_curves_followed_by_offsets_and_errors():
+def test_rows_give_curves_followed_by_offsets():
     rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
-    channel = TimingChannel(DenseSynchronizer(20), errors=True).set_output(transform="pandas")
+    channel = TimingChannel(DenseSynchronizer(20)).set_output(transform="pandas")
     out, inner = channel.fit_transform(rows), channel.synchronizer_
-    names = ("densesynchronizer", "offset", "offset_error")
+    names = ("densesynchronizer", "offset")
     assert list(out.columns) == [f"{name}{k}" for name in names for k in range(20)]
     np.testing.assert_array_equal(out.iloc[:, :20], inner.transform(rows))
-    np.testing.assert_array_equal(out.iloc[:, 20:40], inner.match(rows).offsets_in("percent"))
-    lower, upper = channel.match(rows).interval(0.6827, "percent")
-    np.testing.assert_allclose(out.iloc[:, 40:], (upper - lower) / 2)
-    plain = TimingChannel(DenseSynchronizer(20)).fit(rows)
-    np.testing.assert_array_equal(plain.transform(rows), out.iloc[:, :40])
+    np.testing.assert_array_equal(out.iloc[:, 20:], inner.match(rows).offsets_in("percent"))
+    plain = TimingChannel(DenseSynchronizer(20))
     assert make_pipeline(plain, PCA(2)).fit_transform(rows).shape == (5, 2)
 
 
@@ -166,18 +157,3 @@ def test_fit_refuses_a_feature_with_the_name_of_the_channel(points):
     frames = [pd.DataFrame(x, columns=["p", "offset", "r"]) for x in points]
     with pytest.raises(ValueError, match="has the name of the offset, 'offset': rename it"):
         TimingChannel(LinearSynchronizer()).fit(frames)
-
-
-def test_errors_that_are_not_known_are_refused_in_fit(points):
-    channel = TimingChannel(LinearSynchronizer(), errors=True)
-    with pytest.raises(ValueError, match=r"errors=True needs .*; got Linear.*errors=False"):
-        channel.fit(points)
-    assert not hasattr(channel, "synchronizer_")
-
-
-def test_errors_of_parts_are_those_of_the_whole_body(points):
-    body = DenseSynchronizer(30)
-    expected = TimingChannel(body, errors=True).fit_transform(points)
-    parts = PartSynchronizer({"first": [0]}, synchronizer=body)
-    found = TimingChannel(parts, errors=True).fit_transform(points)
-    np.testing.assert_array_equal(found, expected)
