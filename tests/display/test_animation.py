@@ -1,20 +1,7 @@
-"""Animations: the player in a notebook needs no network and draws each picture once."""
-
-import re
+"""Animations draw each picture once."""
 
 import pytest
 from sklearn_motionsync.display import SkeletonDisplay
-
-
-def test_player_loads_nothing_from_a_network_and_its_buttons_have_icons(bending):
-    display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
-    player = display.animate(seconds=0.2, fps=10).to_jshtml()
-    assert not re.search(r"<link|@import|url\(|(src|href)=.https?:", player)
-    buttons = re.findall(r"<button ([^>]*)>\s*(.*?)\s*</button>", player, re.DOTALL)
-    assert len({picture for _, picture in buttons}) == len(buttons) == 9
-    for attributes, picture in buttons:
-        assert re.search('title="[^"]+"', attributes)
-        assert re.fullmatch(r"<svg .*<path .*</svg>", picture)
 
 
 def test_the_layout_is_computed_once_and_each_picture_drawn_once(bending, tmp_path):

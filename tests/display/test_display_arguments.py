@@ -194,4 +194,3 @@ def test_animate_refuses_impossible_durations():
     display = draw_positions()
     for arguments in ({"seconds": 0}, {"seconds": np.nan}, {"fps": -1}):
         refuses(partial(display.animate, **arguments), "seconds and fps must be above 0")
-    refuses(lambda: display.animate(seconds=1e9), r"are 1.5e\+10 pictures, more than")

@@ -223,13 +223,12 @@ def test_animation_plays_from_the_first_to_the_last_frame(bunch, pipe, monkeypat
     html = HTMLFormatter()(animation)
     assert html.count("data:image/png;base64") == 4
     assert "Animation" in html
-    # The notebook shows the animation without the figure, but keeps axes of the user.
+    # The notebook shows the animation without the figure.
     assert not plt.fignum_exists(number)
-    figure, axes = plt.subplots(2, 1)
-    HTMLFormatter()(display.animate(axes, seconds=0.2, fps=5))
+    axes = plt.figure().subplots(2, 1)
+    display.plot(axes).animate(seconds=0.2, fps=5)
     assert display.axes_ == list(axes)
     assert all(len(axis.collections) == 4 for axis in axes), "earlier bodies are still there"
-    assert plt.fignum_exists(figure.number)
 
 
 def test_from_trials_keeps_the_pace(bunch):
