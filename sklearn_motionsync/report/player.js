@@ -10,7 +10,7 @@ function play(set) {
   const perFrame = set.points * set.dims, missing = -32768;
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const starts = [0];
-  for (const count of set.counts) starts.push(starts[starts.length - 1] + count * perFrame);
+  for (const count of set.lengths) starts.push(starts[starts.length - 1] + count * perFrame);
   let share = 0, before = null, angle = 0, room = null, scale = 1, cells = [];
 
   const chosenPace = () => document.querySelector("input[name=pace]:checked").value;
@@ -38,9 +38,9 @@ function play(set) {
 
   // The points of a trial at its moment, between two frames.
   function pose(i) {
-    const moment = own(i) * (set.counts[i] - 1), low = Math.floor(moment);
+    const moment = own(i) * (set.lengths[i] - 1), low = Math.floor(moment);
     const a = starts[i] + low * perFrame;
-    const b = starts[i] + Math.min(low + 1, set.counts[i] - 1) * perFrame;
+    const b = starts[i] + Math.min(low + 1, set.lengths[i] - 1) * perFrame;
     const points = [];
     for (let p = 0; p < perFrame; p += set.dims) {
       points.push(view((d) => {

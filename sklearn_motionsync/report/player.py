@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import pathlib
-from bisect import bisect_right
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -31,9 +30,8 @@ from ..utils.files import check_path
 from ..utils.pipelines import transform_through, union_transformers
 from .page import Page, paragraph, read_part
 
-# Coordinates that a report holds, at most, of two bytes each: 4 MB of text. And frames a trial that
-# a movement needs at least; where these are too many, there are fewer trials.
-MOST_COORDINATES, _FEWEST_FRAMES = 1_500_000, 25
+# Coordinates of two bytes each that a report holds of more than two trials: 4 MB of text.
+MOST_COORDINATES = 1_500_000
 # The largest number, and what stands for a joint that was not seen.
 _LARGEST, _MISSING = 32767, -32768
 # Trials that are side by side, at most.
@@ -104,8 +102,8 @@ def write_player(
 
     Notes
     -----
-    Positions have a precision of a 30 000th of the largest, and take 4 MB of the file at most: of
-    more, longer trials have fewer frames. The page names it. The names are in the file.
+    Positions have a precision of a 30 000th of the largest, and a million numbers take 2.7 MB of
+    the file. The names are in the file.
 
     Examples
     --------
@@ -149,10 +147,10 @@ def write_player(
         rows = Keyframes(keyframes, n, frame_rate, anywhere=True)
         shares = rows.shares(Trials([points for points, _, _ in bodies], "list", facts.labels))
         marks = _marks(shares, getattr(keyframes, "columns", ()), times)
-    data, note = data_of_bodies(bodies, names, seconds, times, marks)
+    data = data_of_bodies(bodies, names, seconds, times, marks)
     data["alone"] = True
     page = Page()
-    add_player(page, data, note)
+    add_player(page, data)
     return page.write(path, "Side by side" if title is None else title)
 
 
@@ -191,10 +189,11 @@ def add_player_of(page, trials, X, params, skeleton):
     X = as_trials(X, skeleton)
     first = 0 if pattern is None else pattern
     width = int(np.prod(_points(X[first], skeleton, first)[0].shape[1:]))
-    most = max(MOST_COORDINATES // (width * _FEWEST_FRAMES), 2)
-    chosen = sorted(sorted(range(n), key=lambda i: i != first)[:most])
-    right = chosen.index(first)
-    data, note = data_of_bodies(
+    order = sorted(range(n), key=lambda i: i != first)
+    fits = np.cumsum([len(X[i]) for i in order]) * width <= MOST_COORDINATES
+    chosen = sorted(order[: max(np.count_nonzero(fits), 2)])
+    right, note = chosen.index(first), ""
+    data = data_of_bodies(
         [_points(X[i], skeleton, i) for i in chosen],
         [trials.names[i] + " (pattern)" * (i == pattern) for i in chosen],
         None if trials.seconds is None else trials.seconds[chosen],
@@ -203,12 +202,12 @@ def add_player_of(page, trials, X, params, skeleton):
     # One beside the pattern.
     data["shown"] = sorted({1 if right == 0 and len(chosen) > 1 else 0, right})
     if len(chosen) < n:
-        note = f"{note} The player holds {counted(len(chosen), 'trial')} of {n}."
+        note = f"The player holds {counted(len(chosen), 'trial')} of {n}."
     add_player(page, data, note)
 
 
 def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
-    """What the script of the player reads, and sentences on colours and on what was left out.
+    """What the script of the player reads.
 
     Parameters
     ----------
@@ -224,22 +223,11 @@ def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
     """
     bones, dots = bodies[0][1:]
     lengths = np.array([len(points) for points, _, _ in bodies])
-    width = int(np.prod(bodies[0][0].shape[1:]))
-    most, counts = max(MOST_COORDINATES // width, 2 * len(bodies)), range(2, lengths.max() + 1)
-    # The largest number of frames of a trial with which all have so many frames together.
-    longest = bisect_right(counts, most, key=lambda n: np.minimum(lengths, n).sum()) + 1
-    longest, positions = max(longest, 2), []
-    for points, _, _ in bodies:
-        if len(points) > longest:
-            even = Match([np.arange(float(longest))])
-            flat = points.reshape(len(points), -1)
-            points = even.warp([flat])[0].reshape(longest, *points.shape[1:])
-        positions.append(points)
-    every = np.concatenate(positions)
+    every = np.concatenate([points for points, _, _ in bodies])
     scale = np.nanmax(np.abs(every)) / _LARGEST or 1.0
     durations = lengths - 1.0 if seconds is None else seconds
     middle = float(np.median(durations))
-    data = {
+    return {
         "names": names,
         "shown": list(range(len(names))),
         "most": MOST_SHOWN,
@@ -249,7 +237,6 @@ def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
         "lengths": lengths.tolist(),
         "median": middle,
         "pace": 1.0 if seconds is not None else _UNKNOWN / middle,
-        "counts": [len(points) for points in positions],
         "points": every.shape[1],
         "dims": every.shape[2],
         "positions": _packed(np.where(np.isnan(every), _MISSING, every / scale), "<i2"),
@@ -261,16 +248,13 @@ def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
         "dots": dots,
         "colors": {"light": {side: COLORS[side] for side in _ON_DARK}, "dark": _ON_DARK},
     }
-    note = ["Left limbs are blue, right ones orange."] if bones else []
-    if lengths.max() > longest:
-        note.append(f"To keep this file small, it holds {longest} frames of longer trials.")
-    return data, " ".join(note)
 
 
-def add_player(page, data, note):
+def add_player(page, data, note=""):
     """Add the player to a page, as the last section."""
     page.player = data
-    page.add("Stick figures", read_part("player.html"), paragraph(note))
+    colors = "Left limbs are blue, right ones orange." if data["bones"] else ""
+    page.add("Stick figures", read_part("player.html"), paragraph(f"{colors} {note}".strip()))
 
 
 def _points(x, skeleton, i):

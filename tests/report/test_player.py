@@ -9,7 +9,7 @@ import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Match, Skeleton
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.report import player, write_player
+from sklearn_motionsync.report import write_player
 
 from pages import Page
 
@@ -26,7 +26,7 @@ def positions_of(data):
     numbers = whole_numbers(data["positions"], "<i2").astype(float)
     numbers[numbers == -32768] = np.nan
     points = (numbers * data["scale"]).reshape(-1, data["points"], data["dims"])
-    return np.split(points, np.cumsum(data["counts"])[:-1])
+    return np.split(points, np.cumsum(data["lengths"])[:-1])
 
 
 def write(tmp_path, X=BENDS.data, skeleton=BENDS.skeleton, **given):
@@ -142,37 +142,11 @@ def test_points_without_bones_gaps_and_one_trial(tmp_path):
     at_rest = write(tmp_path, PLANE, None).data["player"]
     assert (at_rest["scale"], not np.any(positions_of(at_rest))) == (1, True)
     data = write(tmp_path, x, None).data["player"]
-    assert (data["bones"], len(data["dots"]), data["counts"]) == ([], 15, [len(x)])
+    assert (data["bones"], len(data["dots"]), data["lengths"]) == ([], 15, [len(x)])
     (points,) = positions_of(data)
     assert np.isnan(points).any(axis=(1, 2)).sum() == 4
     bare = Skeleton(BENDS.skeleton.joints, [-1] * 15)
     assert write(tmp_path, skeleton=bare).data["player"]["dots"] == list(range(15))
-
-
-def test_long_trials_have_fewer_frames_and_the_page_names_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(player, "MOST_COORDINATES", 5 * 20 * 14 * 3)
-    page = write(tmp_path)
-    data = page.data["player"]
-    assert sum(data["counts"]) * data["points"] * 3 <= 5 * 20 * 14 * 3
-    assert f"holds {max(data['counts'])} frames of longer trials" in page.page
-    assert data["lengths"] == [len(x) for x in BENDS.data]
-    fewer = positions_of(data)[0]
-    monkeypatch.undo()
-    whole = positions_of(write(tmp_path).data["player"])[0]
-    at = np.linspace(0, len(whole) - 1, len(fewer))
-    for j, k in np.ndindex(whole.shape[1:]):
-        between = np.interp(at, range(len(whole)), whole[:, j, k])
-        np.testing.assert_allclose(fewer[:, j, k], between, atol=2e-4)
-
-
-@pytest.mark.parametrize("most", [1, 9, 19, 20, 21, 31, 32, 100])
-def test_the_longest_trial_is_as_long_as_all_fit(tmp_path, monkeypatch, most):
-    monkeypatch.setattr(player, "MOST_COORDINATES", 16 * 3 * most)
-    X = [x[:n] for x, n in zip(BENDS.data, (3, 8, 12, 9), strict=False)]
-    totals = {n: sum(min(n, len(x)) for x in X) for n in range(2, 13)}
-    longest = max((n for n in totals if totals[n] <= most), default=2)
-    counts = write(tmp_path, X).data["player"]["counts"]
-    assert counts == [min(longest, len(x)) for x in X]
 
 
 # -- what is refused --------------------------------------------------------------------------

@@ -336,7 +336,7 @@ def test_bodies_are_those_that_reach_the_step_with_a_skeleton(tmp_path):
     data, match = page.data["player"], Match.from_estimator(pipe, wide, keyframes=keyframes)
     assert "Stick figures" in page.headings
     assert data["positions"] == expected
-    assert data["counts"] == [len(x) for x in BENDING.data]
+    assert data["lengths"] == [len(x) for x in BENDING.data]
     warps = np.frombuffer(base64.b64decode(data["warps"]), "<u2").reshape(6, 30) / 65535
     np.testing.assert_allclose(warps, match.times / 29, atol=1e-4)
 
@@ -398,8 +398,9 @@ def test_the_player_of_a_report_holds_the_pattern_and_the_first_trials(
     steps = DirectionCosines(BENDING.skeleton), DenseSynchronizer(20, pattern=pattern)
     pipe = make_pipeline(*steps).fit(BENDING.data)
     X, given = BENDING.data[:5], {"features": 0, "frame_rate": 10}
-    # 25 frames of 3 trials with 16 points each.
-    monkeypatch.setattr(player, "MOST_COORDINATES", 25 * 3 * 16 * 3)
+    # Of 16 points each.
+    most = sum(len(X[k]) for k in chosen) * 16 * 3
+    monkeypatch.setattr(player, "MOST_COORDINATES", most)
     page = write(tmp_path, pipe, X, **given)
     data = page.data["player"]
     names = [f"{k} (pattern)" if k == pattern else str(k) for k in chosen]
@@ -408,7 +409,7 @@ def test_the_player_of_a_report_holds_the_pattern_and_the_first_trials(
     assert "The player holds 3 trials of 5." in page.text
     monkeypatch.setattr(player, "MOST_COORDINATES", 1)
     two = write(tmp_path, pipe, X, **given).data["player"]
-    assert (two["names"], two["counts"]) == ([names[0], names[shown[1]]], [2, 2])
+    assert two["names"] == [names[0], names[shown[1]]]
     one = write(tmp_path, pipe, [X[3]], **given)
     assert (one.data["player"]["names"], one.data["player"]["shown"]) == (["0"], [0])
     assert "The player holds" not in one.text
