@@ -34,17 +34,15 @@ def as_names(names, count, what, each):
         The name of the argument, and what its entries belong to.
     """
     listed = _as_list(names)
-    if listed is None or len(listed) != count or any(np.ndim(name) > 0 for name in listed):
+    if (
+        listed is None
+        or len(listed) != count
+        or any(np.ndim(name) > 0 or pd.isna(name) for name in listed)
+    ):
         got = repr(names) if listed is None else f"{len(listed)}: {listed[:6]}"
         raise ValueError(
             f"{what} must be a list of text, one for each of the {count} {each}, got {got}."
         )
-    for i, name in enumerate(listed):
-        if pd.isna(name):
-            raise ValueError(
-                f"{what} must be text for each of the {count} {each}, but entry {i} is {name!r}, "
-                "a missing value: give it a name, such as 'unknown', or leave it out."
-            )
     return [str(name) for name in listed]
 
 
