@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     LinearSynchronizer,
     PartSynchronizer,
-    TimingChannel,
     comparison,
     datasets,
     display,
@@ -36,7 +35,6 @@ DENSE, LINEAR = (sync.fit(X) for sync in (DenseSynchronizer(21), LinearSynchroni
 PARTS = PartSynchronizer({"leg": [0, 1]}, synchronizer=DENSE).fit(X)
 MATCH = DENSE.match(X)
 CYCLES = takes.CycleSegmenter(not_cyclic="drop")
-CHANNEL = TimingChannel(LINEAR)
 MODEL = make_pipeline(DENSE, ActionModel()).fit(X)
 METHODS = ("fit", "fit_transform", "match", "transform")
 
@@ -79,7 +77,6 @@ def with_files(tmp_path):
         "Match.to_frame": MATCH.to_frame,
         "PartSynchronizer.lags": partial(PARTS.lags, X, unit="frames"),
         "PartSynchronizer.match_parts": partial(PARTS.match_parts, X),
-        "TimingChannel": lambda **k: CHANNEL.set_params(**k).fit(X),
         "CycleSegmenter": lambda **k: takes.CycleSegmenter(**k).fit(X),
         "find_trials": lambda frame_rate: takes.find_trials(
             DENSE, X, frame_rate=50, pattern_rate=frame_rate

@@ -156,7 +156,7 @@ LinearSynchronizer().fit(X, keyframes=[[5, 9], [6, 8], np.array([4, 9])])
 DenseSynchronizer(keyframe_std=2.5).fit(X, keyframes=[[5.5], None, np.array([np.nan])])
 DenseSynchronizer().fit_transform(X, keyframes=pd.DataFrame({"a": [0.5, 0.6, 0.7]}), frame_rate=10)
 keyframes_from_events(X, pd.DataFrame({"trial": [0], "event": "a", "frame": 5}), ["a"]).loc[0, "a"]
-TimingChannel(LinearSynchronizer(), "frames").fit_transform(X).shape
+TimingChannel(LinearSynchronizer()).fit_transform(X).shape
 ActionModel(coverage=0.9).fit(X, groups=["ann", "ann", "bob"]).envelope()[0].shape
 ActionModel().fit(X, groups=pd.Series([0, 1, 2])).sample(2, random_state=0).tolist()
 ActionClassifier(n_landmarks=None, n_jobs=1)

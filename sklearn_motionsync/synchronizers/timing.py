@@ -8,7 +8,6 @@ import numpy as np
 from sklearn import get_config
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, TransformerMixin, clone
 from sklearn.utils import get_tags
-from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.metadata_routing import (
     MetadataRouter,
     MethodMapping,
@@ -17,12 +16,12 @@ from sklearn.utils.metadata_routing import (
 )
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.types import NamesLike, Transformed, TrialsLike, Unit
+from ..inputs.types import NamesLike, Transformed, TrialsLike
 from ..inputs.validation import restore
 from ..utils.parallel import LongWorkMixin
-from ..utils.parameters import FRAME_RATE, validated_with_nested
+from ..utils.parameters import validated_with_nested
 from .base import Synchronizer
-from .match import UNITS, Match, check_match
+from .match import Match, check_match
 from .training import with_confidence
 
 # The appended feature.
@@ -35,17 +34,14 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
     """Synchronised trials, with their timing as an additional feature.
 
     Synchronisation removes differences in timing from the curves. Here they are appended to the
-    curves, as how much later than the pattern a trial is (`Match.offsets_in`). So later steps, such
-    as principal components, a test along the clock, or a classifier, use both shape and timing.
+    curves, as how much later than the pattern a trial is, in per cent of the clock. So later
+    steps, such as principal components, a test along the clock, or a classifier, use both shape
+    and timing.
 
     Parameters
     ----------
     synchronizer : Synchronizer
         Such as ``DenseSynchronizer()``; a clone of it is fitted.
-    unit : {"percent", "frames", "seconds"}, default="percent"
-        Unit of the offset: per cent of the clock, frames of the pattern, or seconds of each trial.
-    frame_rate : float, default=None
-        Frames per second of the trials, for seconds only.
 
     Attributes
     ----------
@@ -88,21 +84,10 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
     [1.0, 9.0]
     """
 
-    _parameter_constraints: dict = {
-        "synchronizer": [Synchronizer],
-        "unit": [StrOptions(set(UNITS))],
-        "frame_rate": [FRAME_RATE, None],
-    }
+    _parameter_constraints: dict = {"synchronizer": [Synchronizer]}
 
-    def __init__(
-        self,
-        synchronizer: Synchronizer,
-        unit: Unit = "percent",
-        frame_rate: float | None = None,
-    ) -> None:
+    def __init__(self, synchronizer: Synchronizer) -> None:
         self.synchronizer = synchronizer
-        self.unit = unit
-        self.frame_rate = frame_rate
 
     @validated_with_nested
     def fit(self, X: TrialsLike, y: object = None, **params: Any) -> Self:
@@ -125,11 +110,8 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         Raises
         ------
         ValueError
-            If the frame rate for seconds is missing, or a feature has the name of the offset; and
-            as from the ``fit`` of the synchronizer.
+            If a feature has the name of the offset; and as from the ``fit`` of the synchronizer.
         """
-        if self.unit == "seconds" and self.frame_rate is None:
-            raise ValueError("unit='seconds' needs frame_rate, frames per second of X.")
         sync, given = clone(self.synchronizer), self._route("fit", params)
         with self._progress(fits=True) as progress, progress.fitting(sync, "synchronizing"):
             sync.fit(X, y, **given)
@@ -208,8 +190,7 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
         # What was hidden in the match is hidden here, too.
         hidden = None if match.reached is None else match.reached.trials.confidence
         curves = match.warp(with_confidence(trials, hidden))
-        lengths = [len(x) for x in trials]
-        offsets = match.offsets_in(self.unit, lengths, self.frame_rate).astype(curves.dtype)
+        offsets = match.offsets_in("percent").astype(curves.dtype)
         if trials.kind == "rows":
             return np.concatenate([curves[:, :, 0], offsets], axis=1)
         out = np.concatenate([curves, offsets[:, :, np.newaxis]], axis=2)
