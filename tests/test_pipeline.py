@@ -135,11 +135,6 @@ def test_unknown_parameter_is_refused(name, flat):
             OF_PIPELINES[name](flat[0], FEW.data, **given)
 
 
-def test_model_without_a_synchronizer_refuses_key_frames(marked):
-    with pytest.raises(TypeError, match="keyframes along with trials X only"):
-        ActionModelDisplay.from_estimator(marked[0], keyframes=FEW.keyframes)
-
-
 def test_key_frames_reach_a_step_before_the_synchronizer(points):
     """Dense matching of what coincides in its key-frames already."""
     K = FEW.keyframes

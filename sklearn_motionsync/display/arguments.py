@@ -140,7 +140,7 @@ def undo_scaling(before, X, width):
     ----------
     before : Pipeline or None
         The steps before an estimator. Synchronizers among them change no features.
-    X : trials, as the pipeline takes them, or None
+    X : trials, as the pipeline takes them
     width : int
         The number of features that reach the estimator.
 
@@ -161,7 +161,7 @@ def undo_scaling(before, X, width):
             x = np.column_stack([step.inverse_transform(x[:, :n_scaled]), x[:, n_scaled:]])
         return x
 
-    collection = None if X is None or len(scalers) < len(steps) else as_collection(X)
+    collection = None if len(scalers) < len(steps) else as_collection(X)
     return undo, {} if collection is None else units_of_columns(collection[0])
 
 

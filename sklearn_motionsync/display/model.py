@@ -9,7 +9,6 @@ import numpy as np
 from sklearn.base import BaseEstimator
 
 from ..inputs.features import choose_features
-from ..inputs.trial_facts import TrialFacts
 from ..inputs.types import Features, TrialsLike, Unit
 from ..inputs.wording import counted
 from ..model.action_model import ActionModel
@@ -47,7 +46,7 @@ class ActionModelDisplay(Display):
     ----------
     mean, lower, upper : ndarray, shape (P, n_shown)
         The mean of the model, and the bounds of the band.
-    trials : ndarray, shape (n_sequences, P, n_shown), or None
+    trials : ndarray, shape (n_sequences, P, n_shown)
         Synchronised.
     axes_ : list of Axes
         The panels, one a feature.
@@ -56,9 +55,9 @@ class ActionModelDisplay(Display):
     envelope_ : list of FillBetweenPolyCollection
         The bands, one a feature.
     trials_ : list of LineCollection
-        The trials, one collection a feature; empty without trials.
+        The trials, one collection a feature.
     departures_ : list of LineCollection
-        The parts of trials outside the band; empty without trials.
+        The parts of trials outside the band.
     keyframes_ : list of list of Line2D
         The key-frames, for each panel; empty without any.
 
@@ -79,7 +78,7 @@ class ActionModelDisplay(Display):
     mean: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-    trials: np.ndarray | None
+    trials: np.ndarray
     axis: TimeAxis
     ylabels: Sequence[str]
     titles: tuple[str, str]  # what the band holds, and what it is
@@ -91,10 +90,10 @@ class ActionModelDisplay(Display):
     def from_estimator(
         cls,
         estimator: BaseEstimator,
-        X: TrialsLike | None = None,
+        X: TrialsLike,
         *,
         features: Features | None = None,
-        band: Literal["points", "trials"] | None = None,
+        band: Literal["points", "trials"] = "trials",
         unit: Unit = "frames",
         units: str | Sequence[str] | Mapping[str, str] | None = None,
         xlabel: str | None = None,
@@ -107,19 +106,18 @@ class ActionModelDisplay(Display):
         ----------
         estimator : ActionModel, or Pipeline with one
             Fitted.
-        X : trials, default=None
+        X : trials
             As the estimator takes them; drawn behind, as they reach the model.
         features : int, str or list of them, default=None
             Features of the model, by index or name. In a pipeline with an `ASpace` they may also
             be features of the poses, such as ``"pelvis_height"``: the model is then fitted again
             on the poses of the trials that it keeps. By default the first four of the
             model. What scalers before the model do to its own features is undone.
-        band : {"points", "trials"}, default=None
+        band : {"points", "trials"}, default="trials"
             The band about the mean, which holds poses of new subjects one by one
             (`ActionModel.envelope`); or their trials from the first frame to the last, with
             probability ``coverage`` of the model (``simultaneous=True``). In features of poses it
-            includes what the `ASpace` leaves out. By default ``"trials"``, without X
-            ``"points"``. Parts of trials outside the band are violet.
+            includes what the `ASpace` leaves out. Parts of trials outside the band are violet.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames or per cent of the pattern, or seconds; the clock then lasts
             as long as the median trial of X.
@@ -132,9 +130,8 @@ class ActionModelDisplay(Display):
             See `plot`.
         **params : dict
             Further arguments of the synchronizer: ``frame_rate``, frames a second of X as recorded,
-            which seconds need where tables do not tell, without X those of the clock;
-            ``keyframes``, which are seconds where a frame rate is given: lines. The columns of a
-            table of key-frames are their names.
+            which seconds need where tables do not tell; ``keyframes``, which are seconds where a
+            frame rate is given: lines. The columns of a table of key-frames are their names.
 
         Returns
         -------
@@ -145,22 +142,15 @@ class ActionModelDisplay(Display):
         ------
         ValueError
             If there is no such feature or band.
-        TypeError
-            If further arguments come without trials.
 
         See Also
         --------
         SkeletonDisplay.from_departures : The limbs that depart, on stick figures.
         GroupDisplay : Groups of trials, with their means and bands.
         """
-        if band is None:
-            band = "points" if X is None else "trials"
         if band not in list(_BAND_TITLES):
             raise ValueError(f"band must be one of {list(_BAND_TITLES)}, got {band!r}.")
         caller = f"{cls.__name__}.from_estimator"
-        beside = [name for name in params if name != "frame_rate"]
-        if X is None and beside:
-            raise TypeError(f"{caller} takes {', '.join(beside)} along with trials X only.")
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
         shown = view.whole if band == "trials" else view.synchronised
@@ -172,7 +162,7 @@ class ActionModelDisplay(Display):
             factor = model.simultaneous_factor()
             lower, upper = (model.mean_ + sign * factor * view.predicted for sign in (-1, 1))
             what = what.format(factor, "predicted ")
-        drawn: list = [model.mean_, lower, upper, *(() if shown is None else shown)]
+        drawn: list = [model.mean_, lower, upper, *shown]
         n_frames = len(model.mean_)
         known_units: dict = {}
         if model is view.model_of_points:
@@ -180,15 +170,13 @@ class ActionModelDisplay(Display):
             undo, known_units = undo_scaling(before, X, model.mean_.shape[1])
             drawn = [undo(x) for x in drawn]
         mean, lower, upper, *trials = (x[:, chosen] for x in drawn)
-        rate = params.get("frame_rate")
-        facts = TrialFacts.of([n_frames], rate) if view.curves is None else view.curves.facts
-        lasting = facts.durations() if unit == "seconds" else None
+        lasting = view.curves.facts.durations() if unit == "seconds" else None
         keyframes = _keyframes_of(estimator, n_frames, params.get("keyframes"))
         return cls._of(
             mean=mean,
             lower=lower,
             upper=upper,
-            trials=np.stack(trials) if trials else None,
+            trials=np.stack(trials),
             axis=TimeAxis(unit, n_frames, None, lasting, xlabel, keyframes=keyframes),
             ylabels=labels_of_signals([view.names[i] for i in chosen], known_units, units),
             titles=(_BAND_TITLES[band].format(100 * model.coverage), what),
@@ -210,15 +198,11 @@ class ActionModelDisplay(Display):
         self.keyframes_ = self.axis.draw_keyframes(self.axes_, self.axes_[0])
         # The meaning of the band is the title of the legend.
         title, what = self.titles
-        handles, labels = [self.envelope_[0]], [what]
-        if self.trials is not None:
-            handles.append(self.trials_[0])
-            labels.append(counted(len(self.trials), "trial"))
-            lower, upper = self._outer_bounds()
-            outside = (self.trials < lower) | (self.trials > upper)
-            handles.append(self.departures_[0])
-            labels.append(f"outside the band: {outside.any(axis=(1, 2)).sum()} of them")
-        handles, labels = [*handles, self.mean_[0]], [*labels, "mean"]
+        lower, upper = self._outer_bounds()
+        outside = (self.trials < lower) | (self.trials > upper)
+        handles = [self.envelope_[0], self.trials_[0], self.departures_[0], self.mean_[0]]
+        beyond = f"outside the band: {outside.any(axis=(1, 2)).sum()} of them"
+        labels = [what, counted(len(self.trials), "trial"), beyond, "mean"]
         below = self.axes_[:n_cols]
         legend_above(self.axes_, handles, labels, title, below=below, n_cols=1)
 
@@ -230,15 +214,13 @@ class ActionModelDisplay(Display):
         self.envelope_.append(band)
         for bound in bounds:
             axis.plot(clock, bound, color=COLORS["pattern"], linewidth=0.9)
-        if self.trials is not None:
-            behind = self.trials[:, :, i]
-            style = {"colors": COLORS["trial"], "linestyles": "dashed", "linewidths": 0.7}
-            lines = curves(axis, [clock] * len(behind), behind, alpha=0.5, **style)
-            self.trials_.append(lines)
-            lower, upper = (bound[:, i] for bound in self._outer_bounds())
-            xs, ys = parts_outside(self.trials[:, :, i], lower, upper)
-            style = {"colors": COLORS["departure"], "linewidths": 1.4, "zorder": 3}
-            self.departures_.append(curves(axis, self.axis.convert(xs), ys, **style))
+        behind = self.trials[:, :, i]
+        style = {"colors": COLORS["trial"], "linestyles": "dashed", "linewidths": 0.7}
+        self.trials_.append(curves(axis, [clock] * len(behind), behind, alpha=0.5, **style))
+        lower, upper = (bound[:, i] for bound in self._outer_bounds())
+        xs, ys = parts_outside(behind, lower, upper)
+        style = {"colors": COLORS["departure"], "linewidths": 1.4, "zorder": 3}
+        self.departures_.append(curves(axis, self.axis.convert(xs), ys, **style))
         self.mean_ += axis.plot(clock, self.mean[:, i], color=COLORS["mean"], linewidth=2)
 
     def _outer_bounds(self):

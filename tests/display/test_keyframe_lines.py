@@ -74,12 +74,13 @@ def test_key_frames_that_trials_lack_are_lines_without_names(sync):
 def test_the_model_of_a_pipeline_shows_them(sync):
     pipe = make_pipeline(DenseSynchronizer(61), ActionModel())
     pipe.fit(X, densesynchronizer__keyframes=K)
-    for trials, keyframes, names in ((X, {"keyframes": K}, True), (None, {}, False)):
+    for keyframes, names in (({"keyframes": K}, True), ({}, False)):
         display = ActionModelDisplay.from_estimator(
-            pipe, trials, features=[0, 1], unit="percent", **keyframes
+            pipe, X, features=[0, 1], unit="percent", **keyframes
         )
         for lines in display.keyframes_:
             np.testing.assert_allclose(places(lines), pipe[0].keyframes_ * 100 / 60)
         assert texts(display.axes_[0]) == ["force peak", "Foot Off, Right"] * names
         assert texts(display.axes_[1]) == []
-    assert ActionModelDisplay.from_estimator(pipe[1]).keyframes_ == []
+    aligned = pipe[0].transform(X, keyframes=K)
+    assert ActionModelDisplay.from_estimator(pipe[1], aligned).keyframes_ == []

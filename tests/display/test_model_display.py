@@ -30,12 +30,12 @@ def test_mean_envelope_and_trials(bunch, pipe):
 
 
 def test_model_in_features_of_poses(bunch, pipe):
-    display = ActionModelDisplay.from_estimator(pipe, features=["left_leg_y", "pelvis_height"])
+    features = ["left_leg_y", "pelvis_height"]
+    display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features, band="points")
     names = list(pipe[0].get_feature_names_out())
     chosen = [names.index("left_leg_y"), names.index("pelvis_height")]
     poses = pipe[1].inverse_transform(pipe[-1].mean_)[:, chosen]
     np.testing.assert_allclose(display.mean, poses, atol=1e-12)
-    assert display.trials_ == display.departures_ == []
     # The variance is that of poses: dimensions of the aSpace are correlated.
     poses = pipe[1].inverse_transform(pipe[:3].transform(bunch.data))[:, :, chosen]
     std = poses.std(axis=0)
@@ -55,15 +55,16 @@ def legend_of(display):
 
 
 def test_each_band_has_its_bounds_and_legend(bunch, pipe):
-    model = ActionModel(n_std=2, coverage=0.9).fit(pipe[:3].transform(bunch.data))
+    X = pipe[:3].transform(bunch.data)
+    model = ActionModel(n_std=2, coverage=0.9).fit(X)
     predicted = f"mean ± {model.simultaneous_factor():.3g} predicted standard deviations"
     for band, bounds, holds, label in (
         ("points", model.envelope(), "single poses", "mean ± 2 standard deviations"),
         ("trials", model.envelope(simultaneous=True), "90 % of new people's trials", predicted),
     ):
-        display = ActionModelDisplay.from_estimator(model, features=[1], band=band)
+        display = ActionModelDisplay.from_estimator(model, X, features=[1], band=band)
         np.testing.assert_allclose([display.lower, display.upper], [x[:, [1]] for x in bounds])
-        title, text = legend_of(display)
+        title, text, _ = legend_of(display)
         assert holds in title
         assert text == label
 
@@ -99,12 +100,12 @@ def test_model_without_a_pipeline(bunch, pipe):
     assert display.ylabels == ["x0", "x1", "x2"]
     assert display.trials.shape == (2, P, 3)
     with pytest.raises(ValueError, match="no feature 'pelvis_height'"):
-        ActionModelDisplay.from_estimator(model, features="pelvis_height")
+        ActionModelDisplay.from_estimator(model, warped, features="pelvis_height")
     double = FunctionTransformer(lambda X: [2 * x for x in X])
     steps = DirectionCosines(bunch.skeleton), ASpace(3), double, DenseSynchronizer(20)
     odd = make_pipeline(*steps, ActionModel()).fit(bunch.data)
     with pytest.raises(ValueError, match="Between ASpace and ActionModel stands FunctionTrans"):
-        ActionModelDisplay.from_estimator(odd, features="pelvis_height")
+        ActionModelDisplay.from_estimator(odd, bunch.data, features="pelvis_height")
 
 
 @pytest.mark.parametrize(
@@ -113,7 +114,6 @@ def test_model_without_a_pipeline(bunch, pipe):
         ({"band": "mean"}, ValueError, "band must be one of .*got 'mean'"),
         ({"band": ["points"]}, ValueError, "band must be one of"),
         ({"features": ["knee"]}, ValueError, "no feature 'knee'; there are 37: pelvis_height"),
-        ({"keyframes": [[3]], "X": None}, TypeError, "takes keyframes along with trials X"),
         ({"unit": "ms"}, ValueError, "unit must be one of .*got 'ms'"),
         ({"unit": "seconds"}, ValueError, "The frame rate of .* is not known"),
         ({"unit": "seconds", "frame_rate": 0}, ValueError, "frame_rate must be one number above"),
@@ -137,13 +137,12 @@ def test_units_of_time(bunch, pipe):
         for artist in (*display.trials_, *display.departures_):
             for path in artist.get_paths():
                 assert path.vertices[:, 0].max() <= last * (1 + 1e-9)
-    # Without trials the frame rate is that of the clock; univariate rows are trials.
+    # Univariate rows are trials.
     rows = np.random.default_rng(0).normal(size=(6, 21))
-    for model, X, n_frames in ((pipe, None, P), (ActionModel().fit(rows), rows, 21)):
-        display = ActionModelDisplay.from_estimator(
-            model, X, features=[0], unit="seconds", frame_rate=10
-        )
-        np.testing.assert_allclose(display.mean_[0].get_xdata(), np.arange(n_frames) / 10)
+    display = ActionModelDisplay.from_estimator(
+        ActionModel().fit(rows), rows, features=[0], unit="seconds", frame_rate=10
+    )
+    np.testing.assert_allclose(display.mean_[0].get_xdata(), np.arange(21) / 10)
 
 
 # -- legends -----------------------------------------------------------------------------
