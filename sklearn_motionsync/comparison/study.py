@@ -559,13 +559,13 @@ class Design:
 
 
 def _even_in_t(t, left):
-    """The variable of Wallace (*Ann. Math. Stat.* 30, 1959), to which deviates are nearly linear."""
+    """The variable of Wallace (*Ann. Math. Stat.* 30, 1959): deviates are nearly linear in it."""
     return np.sqrt(left * np.log1p(np.square(t) / left))
 
 
 @lru_cache(maxsize=32)
 def _deviates_of_t(left):
-    """The spacing of an even table of deviates of t, 0 to 8, the deviates, and their differences."""
+    """The spacing of an even table of deviates of t, 0 to 8; the deviates; their differences."""
     deviates = np.linspace(0, _LARGEST, 8001)
     places = _even_in_t(student.isf(norm.sf(deviates), left), left)
     spacing = places[-1] / 4000
