@@ -374,28 +374,6 @@ class GroupsOfPeople:
         return filled
 
 
-def band_of_mean(values, statistic, coverage):
-    """Mean and half-width of a band, over the first axis.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_people, ...)
-    statistic : {"sd", "se", "interval"}
-        Standard deviation, standard error, or the interval of the mean by t.
-    coverage : float
-        Of the interval.
-    """
-    n = len(values)
-    if n < 2:
-        return values.mean(axis=0), np.full(values.shape[1:], np.nan)
-    spread = values.std(axis=0, ddof=1)
-    if statistic != "sd":
-        spread = spread / np.sqrt(n)
-    if statistic == "interval":
-        spread = spread * student.ppf((1 + coverage) / 2, n - 1)
-    return values.mean(axis=0), spread
-
-
 def means_of_people(persons, in_group=None):
     """The matrix whose product with values is the mean of each person, (n_people, n_sequences)."""
     belongs = persons == np.arange(persons.max() + 1)[:, np.newaxis]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from sklearn.base import BaseEstimator
 from ..comparison.curves import AlignedCurves
 from ..comparison.groups import GroupComparison
 from ..comparison.norm import NormComparison
-from ..comparison.study import GroupsOfPeople, band_of_mean
+from ..comparison.study import GroupsOfPeople
 from ..inputs.features import choose_features
 from ..inputs.keyframes import Keyframes
 from ..inputs.types import Features, Labels, NumbersLike, TrialsLike, Unit
@@ -39,28 +39,20 @@ from .base import (
 
 # Signals that are shown when none are named; of more, the first few.
 _MOST = 6
-# Probability of the interval of a mean, and titles of the legend.
-_COVERAGE = 0.95
-_STATISTICS = {
-    "sd": "mean ± standard deviation of {whom}",
-    "se": "mean ± standard error of {whom}",
-    "interval": "mean of {whom} and its interval of {share:.3g} %",
-}
 # The place of bars of differences, as a share of the panel, and dots beside each other, of the
 # clock.
 _BAR, _BESIDE = 0.015, 0.014
 
 
 class GroupCurves(NamedTuple):
-    """The mean, the band and the trials of a group in each panel.
+    """The mean and the band of a group in each panel.
 
     Attributes
     ----------
     mean, half : ndarray, shape (P, n_panels)
-        The mean, and half the width of the band, NaN without one.
+        The mean, and the standard deviation of people, NaN of a single one.
     offsets : ndarray, shape (n_people, P)
         Of its people, from the mean of all trials, in the unit of time.
-    trials : ndarray (n, P, n_signals), or None
     label : str
         The entry of the legend.
     color, line : str
@@ -70,7 +62,6 @@ class GroupCurves(NamedTuple):
     mean: np.ndarray
     half: np.ndarray
     offsets: np.ndarray
-    trials: np.ndarray | None
     label: str
     color: str
     line: str
@@ -87,7 +78,7 @@ class GroupDisplay(Display):
     ----------
     groups : list of GroupCurves
         For each group the mean and the band of its people, of the signals and of their offsets at
-        last; and its trials, if they are drawn.
+        last.
     events : DataFrame (n_people, n_events), or None
         Where the events of people are on the clock, in frames: lines and their spread.
     axes_ : list of Axes
@@ -96,8 +87,6 @@ class GroupDisplay(Display):
         For each panel the mean of each group.
     bands_ : list of list of FillBetweenPolyCollection
         For each panel the bands; a group of one person has none.
-    trials_ : list of list of LineCollection
-        For each signal the trials of each group; empty without trials.
     dots_ : list of PathCollection
         The people of each group, in the panel of the offsets.
     clusters_ : list of LineCollection
@@ -125,7 +114,7 @@ class GroupDisplay(Display):
     axis: TimeAxis
     ylabels: Sequence[str]
     feature_names: Sequence[str]  # as in the table of clusters
-    title: str  # the meaning of the bands
+    title: str  # what the bands are of
     events: pd.DataFrame | None
     comparison: GroupComparison | None
     pairs: bool  # whether people of all groups are the same, whose dots are joined
@@ -143,8 +132,6 @@ class GroupDisplay(Display):
         groups: Labels | None = None,
         signals: TrialsLike | None = None,
         features: Features | None = None,
-        statistic: Literal["sd", "se", "interval"] = "sd",
-        trials: bool = False,
         comparison: GroupComparison | None = None,
         events: NumbersLike | pd.DataFrame | None = None,
         units: str | Sequence[str] | Mapping[str, str] | None = None,
@@ -164,20 +151,14 @@ class GroupDisplay(Display):
         y : sequence of length n_sequences, default=None
             What the trials are told apart by: the group of each. None draws all as one group.
         groups : sequence of length n_sequences, default=None
-            The subject of each trial. Means and bands are of the means of people. By default
-            every trial counts as a person.
+            The subject of each trial. Means, and bands of one standard deviation, are of the means
+            of people. By default every trial counts as a person.
         signals : trials, default=None
             What is drawn, as in `compare_groups`. By default X in its own units, if the same
             features reach the synchronizer, scaled or not.
         features : int, str or list of them, default=None
             Those of the signals that are drawn. By default all, or of more than six the first four;
             the legend then names how many there are.
-        statistic : {"sd", "se", "interval"}, default="sd"
-            The band about the mean of a group, at each frame: ``"sd"``, the standard deviation of
-            people; ``"se"``, the standard error of the mean; ``"interval"``, the interval of the
-            mean by Student's t, of 95 %.
-        trials : bool, default=False
-            Whether to draw all trials, thin.
         comparison : GroupComparison, default=None
             From `compare_groups` of the same groups: its clusters are bars at the lower edges.
         events : array-like, shape (n_sequences, n_events), default=None
@@ -208,15 +189,13 @@ class GroupDisplay(Display):
         Raises
         ------
         ValueError
-            If there is no such statistic, feature or unit; labels or units do not fit the signals;
+            If there is no such feature or unit; labels or units do not fit the signals;
             the comparison is in another unit; or as from `compare_groups`.
 
         See Also
         --------
         sklearn_motionsync.comparison.compare_groups : Tests what this figure shows.
         """
-        if statistic not in _STATISTICS:
-            raise ValueError(f"statistic must be one of {list(_STATISTICS)}, got {statistic!r}.")
         if comparison is not None and comparison.unit != unit:
             raise ValueError(
                 f"The comparison is in {comparison.unit}, and the figure in {unit}. Set "
@@ -237,12 +216,11 @@ class GroupDisplay(Display):
             others = list(dict.fromkeys(differing[~differing.isin(names)]))
             notes += [f"differences also in {', '.join(others)}"] * bool(others)
         has_people = groups is not None
-        whom = "people" if has_people else "trials"
-        title = _STATISTICS[statistic].format(whom=whom, share=100 * _COVERAGE)
+        title = f"mean ± standard deviation of {'people' if has_people else 'trials'}"
         of_people = GroupsOfPeople.of(y, groups, len(aligned.curves))
         known_units = dict(zip(aligned.names, aligned.units, strict=True))
         return cls._of(
-            groups=_curves_of_groups(of_people, aligned, chosen, statistic, trials, has_people),
+            groups=_curves_of_groups(of_people, aligned, chosen, has_people),
             axis=TimeAxis.of_clock(aligned.unit, aligned.clock, xlabel),
             ylabels=labels_of_signals(names, known_units, units),
             feature_names=names,
@@ -264,14 +242,8 @@ class GroupDisplay(Display):
     def _draw(self):
         *above, timing = self.axes_
         clock = self.axis.clock
-        self.trials_, self.bands_, self.means_ = empty_lists(3)
+        self.bands_, self.means_ = empty_lists(2)
         for i, axis in enumerate(self.axes_):
-            if self.groups[0].trials is not None and axis is not timing:
-                self.trials_.append([])
-                for group in self.groups:
-                    behind, style = group.trials[:, :, i], {"linewidths": 0.7, "alpha": 0.5}
-                    lines = curves(axis, [clock] * len(behind), behind, colors=group.color, **style)
-                    self.trials_[-1].append(lines)
             self.bands_.append([])
             self.means_.append([])
             for group in self.groups:
@@ -373,22 +345,23 @@ class GroupDisplay(Display):
         return [lines for lines in self.clusters_ if len(lines.get_segments())]
 
 
-def _curves_of_groups(of_people, aligned, chosen, statistic, trials, named):
+def _curves_of_groups(of_people, aligned, chosen, named):
     """The curves of each group in the panels of the signals and of the offsets."""
     # Offsets are counted from the mean of all trials.
     offsets = (aligned.offsets - aligned.offsets.mean(axis=0))[:, :, np.newaxis]
     signals = aligned.curves[:, :, chosen]
     of_groups = []
-    for label, (color, line), maker, panels in zip(
+    for label, (color, line), panels in zip(
         of_people.describe(named),
         group_styles(of_people.labels).values(),
-        of_people.makers,
         of_people.means(np.concatenate([signals, offsets], axis=2)),
         strict=True,
     ):
-        mean, half = band_of_mean(panels, statistic, _COVERAGE)
-        behind = signals[maker.any(axis=0)] if trials else None
-        of_groups.append(GroupCurves(mean, half, panels[:, :, -1], behind, label, color, line))
+        half = np.full(panels.shape[1:], np.nan)
+        if len(panels) > 1:
+            half = panels.std(axis=0, ddof=1)
+        mean, offsets_of_people = panels.mean(axis=0), panels[:, :, -1]
+        of_groups.append(GroupCurves(mean, half, offsets_of_people, label, color, line))
     return of_groups
 
 

@@ -18,7 +18,6 @@ from sklearn_motionsync.comparison.study import (
     Design,
     Family,
     Study,
-    band_of_mean,
     enhanced,
     families,
     scaled,
@@ -94,20 +93,6 @@ def test_shares_of_draws_count_equal_ones():
     assert family.ranks.tolist() == [0.75, 1, 0.25, 0.75]
     assert family.p_value == 0.75
     assert share_at_most(family.ranks, [0.75, 0.5, 0.25]).tolist() == [0.75, 0.25, 0.25]
-
-
-@pytest.mark.parametrize("n", [1, 2, 5])
-def test_bands_of_means_are_those_of_scipy(n):
-    values = np.random.default_rng(0).standard_normal((n, 3))
-    mean, interval = band_of_mean(values, "interval", 0.9)
-    np.testing.assert_allclose(mean, values.mean(axis=0))
-    halves = [band_of_mean(values, statistic, 0.9)[1] for statistic in ("sd", "se")]
-    if n == 1:
-        assert np.isnan([*halves, interval]).all()
-    else:
-        np.testing.assert_allclose(halves, [np.std(values, 0, ddof=1), stats.sem(values)])
-        low, high = stats.t.interval(0.9, n - 1, mean, stats.sem(values))
-        np.testing.assert_allclose([mean - interval, mean + interval], [low, high])
 
 
 def deviates(design, y):
