@@ -17,7 +17,7 @@ from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
 from ..inputs.facts import compare_facts
 from ..inputs.numbers import as_numbers, check_finite
-from ..inputs.recorded import SAME_RATE, timeless
+from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, labels_of
 from ..inputs.types import NumbersLike, TrialsLike
 from ..inputs.wording import counted
@@ -80,8 +80,7 @@ def blend_trials(
     Returns
     -------
     ndarray, shape (n_frames, n_features), or DataFrame
-        Of the kind and dtype of the trials of X. Frames of a table are numbered from 0, or
-        are times from 0 if those of X are.
+        Of the kind and dtype of the trials of X. Frames of a table are numbered from 0.
 
     Raises
     ------
@@ -127,9 +126,11 @@ def blend_trials(
     108
     """
     skeleton = _skeleton_of(estimator, skeleton)
-    may_be_rows = skeleton is None and not isinstance(estimator, Match)
-    sequences, arrays, is_rows = _read(X, may_be_rows)
-    labels, levels = labels_of(sequences)
+    sequences = as_collection(X)
+    if sequences is None:
+        raise ValueError(NOT_ONE)
+    arrays = check_members(sequences)
+    labels, _ = labels_of(sequences)
     rates = compare_facts(arrays.facts, arrays.called).get("frame_rate", ())
     if skeleton is not None:
         # Refuses sequences that are not positions of the skeleton.
@@ -152,20 +153,7 @@ def blend_trials(
         out = blend_numbers(chosen, frames[used], weights[used])
     else:
         out = blend_bodies(chosen, frames[used], weights[used], skeleton)
-    out = out.astype(arrays[0].dtype, copy=False)
-    return out[:, 0] if is_rows else _like(sequences, out, levels[-1], rates)
-
-
-def _read(X, may_be_rows):
-    """Trials as they were given, as arrays, and whether they are univariate rows."""
-    sequences = as_collection(X)
-    is_rows = sequences is None
-    if is_rows:
-        X = np.asarray(X)
-        if X.ndim != 2 or not may_be_rows:
-            raise ValueError(NOT_ONE)
-        sequences = [x[:, np.newaxis] for x in X]
-    return sequences, check_members(sequences), is_rows
+    return _like(sequences[0], out.astype(arrays[0].dtype, copy=False), rates)
 
 
 def _skeleton_of(estimator, skeleton):
@@ -267,24 +255,12 @@ def _blend_pace(warps, timing):
     return np.where(np.abs(frames - exact) < ROUNDING * warps.max(), exact, frames), at
 
 
-def _like(sequences, array, name, rates):
-    """An array as a trial of the kind of others, which have these frame rates."""
-    x = sequences[0]
+def _like(x, array, rates):
+    """An array as a trial of the kind of ``x``, one of those that have these frame rates."""
     if not isinstance(x, pd.DataFrame):
         return array
-    df = pd.DataFrame(array, columns=x.columns, index=_clock(sequences, len(array), name))
+    df = pd.DataFrame(array, columns=x.columns, index=pd.RangeIndex(len(array), name=FRAME))
     df.attrs = {key: value for key, value in timeless(x).items() if key not in _LABELS}
     if "frame_rate" in df.attrs or rates:
         df.attrs["frame_rate"] = rates[0] if len(rates) == 1 else None
     return df
-
-
-def _clock(sequences, n_frames, name):
-    """Frames from 0; or times, if all trials have times of one frame rate."""
-    indices = [x.index for x in sequences if isinstance(x, pd.DataFrame)]
-    if not all(index.dtype.kind in "fmM" for index in indices):
-        return pd.RangeIndex(n_frames, name=name)
-    steps = [(index[-1] - index[0]) / (len(index) - 1) for index in indices]
-    if max(steps) - min(steps) > SAME_RATE * min(steps):
-        return pd.RangeIndex(n_frames, name=FRAME)
-    return pd.Index(np.arange(n_frames) * steps[0], name=name)
