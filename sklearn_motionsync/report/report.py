@@ -5,7 +5,6 @@ from __future__ import annotations
 import pathlib
 import re
 from collections.abc import Mapping
-from contextlib import contextmanager
 from html import escape
 from typing import Any, NamedTuple
 
@@ -135,7 +134,8 @@ def write_report(
     '<!DOCTYPE html>'
     """
     path = check_path(path, "report.html")
-    with own_figures():
+    # In the style of matplotlib itself.
+    with pyplot().style.context("default"):
         aligned = AlignedCurves.of(
             estimator, X, params, "write_report", signals=signals, features=features, unit=unit
         )
@@ -466,19 +466,6 @@ class TrialSet(NamedTuple):
 
 
 # -- figures ---------------------------------------------------------------------------------------
-
-
-@contextmanager
-def own_figures():
-    """Figures in the style of matplotlib itself, which are closed at the end."""
-    plt = pyplot()
-    before = set(plt.get_fignums())
-    try:
-        with plt.style.context("default"):
-            yield
-    finally:
-        for number in set(plt.get_fignums()) - before:
-            plt.close(number)
 
 
 class SignalsDisplay(SynchronizationDisplay):
