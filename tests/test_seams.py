@@ -13,6 +13,7 @@ import re
 import weakref
 from collections import Counter
 from typing import NamedTuple
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -283,8 +284,8 @@ def nothing_is_drawn():
     with pytest.MonkeyPatch.context() as patch:
         for kind in (getattr(display, name) for name in display.__all__):
             patch.setattr(kind, "plot", lambda self, *args, **kwargs: self)
-        for name in ("draw_signals", "picture"):
-            patch.setattr(f"sklearn_motionsync.report.report.{name}", lambda *args: "")
+        patch.setattr("sklearn_motionsync.report.report.SignalsDisplay", Mock())
+        patch.setattr("sklearn_motionsync.report.report.picture", lambda *args: "")
         yield
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
+from sklearn.utils import Bunch
 
 from ..comparison.curves import AlignedCurves
 from ..comparison.groups import GroupComparison
@@ -44,29 +45,6 @@ _MOST = 6
 _BAR, _BESIDE = 0.015, 0.014
 
 
-class GroupCurves(NamedTuple):
-    """The mean and the band of a group in each panel.
-
-    Attributes
-    ----------
-    mean, half : ndarray, shape (P, n_panels)
-        The mean, and the standard deviation of people, NaN of a single one.
-    offsets : ndarray, shape (n_people, P)
-        Of its people, from the mean of all trials, in the unit of time.
-    label : str
-        The entry of the legend.
-    color, line : str
-        The colour and the line style of the mean.
-    """
-
-    mean: np.ndarray
-    half: np.ndarray
-    offsets: np.ndarray
-    label: str
-    color: str
-    line: str
-
-
 class GroupDisplay(Display):
     """Means of groups with bands, the timing of their people, and where they differ.
 
@@ -76,9 +54,11 @@ class GroupDisplay(Display):
 
     Attributes
     ----------
-    groups : list of GroupCurves
-        For each group the mean and the band of its people, of the signals and of their offsets at
-        last.
+    groups : list of Bunch
+        For each group ``mean`` and ``half``, shape (P, n_signals + 1): the mean and the standard
+        deviation of its people, NaN of a single one, of the signals and of their offsets at last;
+        ``offsets`` (n_people, P), from the mean of all trials, in the unit of time; its ``label``
+        in the legend, and the ``color`` and the ``line`` style of the mean.
     events : DataFrame (n_people, n_events), or None
         Where the events of people are on the clock, in frames: lines and their spread.
     axes_ : list of Axes
@@ -110,7 +90,7 @@ class GroupDisplay(Display):
     ['A: 12 trials of 4 people', 'B: 12 trials of 4 people']
     """
 
-    groups: Sequence[GroupCurves]
+    groups: Sequence[Bunch]
     axis: TimeAxis
     ylabels: Sequence[str]
     feature_names: Sequence[str]  # as in the table of clusters
@@ -360,8 +340,16 @@ def _curves_of_groups(of_people, aligned, chosen, named):
         half = np.full(panels.shape[1:], np.nan)
         if len(panels) > 1:
             half = panels.std(axis=0, ddof=1)
-        mean, offsets_of_people = panels.mean(axis=0), panels[:, :, -1]
-        of_groups.append(GroupCurves(mean, half, offsets_of_people, label, color, line))
+        of_groups.append(
+            Bunch(
+                mean=panels.mean(axis=0),
+                half=half,
+                offsets=panels[:, :, -1],
+                label=label,
+                color=color,
+                line=line,
+            )
+        )
     return of_groups
 
 

@@ -222,7 +222,7 @@ def _add_signals(page, trials, features):
         "Before and after",
         paragraph(finding, "finding"),
         picture(
-            draw_signals(trials, shown),
+            SignalsDisplay.of_trials(trials, shown).figure_,
             f"Curves of {counted(len(trials.names), 'trial')}, on the left time-normalised, on the "
             f"right aligned, and below their offsets. {finding}",
         ),
@@ -479,7 +479,7 @@ class SignalsDisplay(SynchronizationDisplay):
         lasting, reached = [aligned.clock[-1]] * n, aligned.reached
         keyframes = named_keyframes(reached.synchronizer, reached.params.get("keyframes"))
         after = aligned.curves[:, :, shown]
-        return cls._of(
+        display = cls._of(
             before=list(aligned.even[:, :, shown]),
             after=after,
             match=aligned.match,
@@ -490,10 +490,6 @@ class SignalsDisplay(SynchronizationDisplay):
             groups=list(map(str, trials.design["group"])) if "group" in trials.design else None,
             warps=True,
         ).plot()
-
-
-def draw_signals(trials, shown):
-    """The figure of a `SignalsDisplay`, with the label of its time under both columns."""
-    display = SignalsDisplay.of_trials(trials, shown)
-    display.axes_[-3].set_xlabel(display.axes_[-2].get_xlabel())
-    return display.figure_
+        # The label of time is under both columns.
+        display.axes_[-3].set_xlabel(display.axes_[-2].get_xlabel())
+        return display
