@@ -100,8 +100,8 @@ def compare_effects(
       person has an effect, however people vary; tested is the mean over all people;
     - of one factor of people without other effects on the same values, people, as in
       `compare_groups`: groups may vary differently;
-    - of all else, what the other effects leave of people (Freedman and Lane 1983), who should vary
-      alike.
+    - of all else, what the other effects leave of people (Freedman and Lane 1983), which should
+      vary alike in all of them.
 
     Effects of people are adjusted for each other, with groups that count alike, however many people
     they have (type III).
