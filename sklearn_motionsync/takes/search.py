@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from bisect import bisect, insort
+from functools import partial
 from numbers import Real
 from typing import Any, Literal, NamedTuple
 
@@ -16,9 +17,9 @@ from sklearn.utils.validation import check_is_fitted
 from ..inputs.collections import as_collection
 from ..inputs.facts import facts_in_fit, facts_of
 from ..inputs.numbers import as_numbers, check_finite
-from ..inputs.recorded import SAME_RATE, timeless
+from ..inputs.recorded import SAME_RATE
 from ..inputs.resampling import as_frame_rates
-from ..inputs.tables import FRAME, as_pandas
+from ..inputs.tables import as_pandas
 from ..inputs.types import Labels, TrialLike, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_input
 from ..inputs.wording import counted, within
@@ -100,10 +101,10 @@ def find_trials(
         takes the takes. An array is a single trial, which carries no information about the
         differences between trials.
     X : array (n_frames, n_features), list of such arrays, or other collection
-        One take, or several. A take of a single feature may be one-dimensional. Takes of another
-        frame rate than the training trials are resampled to theirs. Tables know their rate,
-        by ``attrs["frame_rate"]`` or an index in seconds; for others give ``frame_rate`` and
-        ``pattern_rate``. If neither is known, both are taken to have the same.
+        One take, or several. A take of a single feature may be one-dimensional. Of another frame
+        rate than the training trials they have as many more or fewer frames a trial. Tables know
+        their rate, by ``attrs["frame_rate"]`` or an index in seconds; for others give
+        ``frame_rate`` and ``pattern_rate``. If neither is known, both are taken to have the same.
     threshold : "auto", float or None, default="auto"
         The lowest score of a hit. ``"auto"``: learnt from the training trials, each compared
         with those of other groups, but not below what random movements among their poses rarely
@@ -166,17 +167,20 @@ def find_trials(
     X = as_takes(X, univariate=True)
     checker = type("find_trials", (SequenceLevelMixin, BaseEstimator), {})()
     checked = check_input(checker, X, reset=True, level="sequence", facts=())
-    searched, paces = _at_rate_of(pattern, X, checked, frame_rate, pattern_rate)
-    synchronizer, takes, codes = _reach(pattern, searched, groups)
-    _check_lengths(checked if searched is X else searched, takes, checked.called)
+    paces = _paces_of(pattern, checked, frame_rate, pattern_rate)
+    with warnings.catch_warnings():
+        # Windows are as long as the frame rate of their take makes them.
+        warnings.filterwarnings("ignore", ".* frames a second, and", UserWarning)
+        synchronizer, takes, codes = _reach(pattern, X, groups)
+    _check_lengths(checked, takes, checked.called)
     dissimilarity = WindowDissimilarity(synchronizer, codes)
     propose = Proposer(synchronizer)
     with Progress(checker, verbose) as progress:
-        hits = _search_takes(takes, propose, dissimilarity, threshold, coverage, progress)
+        hits = _search_takes(takes, paces, propose, dissimilarity, threshold, coverage, progress)
     rows = []
     for i, (hits_of_take, level) in enumerate(hits):
         best = [hit[:3] for hit in hits_of_take if threshold is None or hit.score >= level]
-        rows += [(i, *hit, level) for hit in in_frames_given(best, paces[i], len(checked[i]))]
+        rows += [(i, *hit, level) for hit in best]
     types = {"take": int, "start": int, "stop": int, "score": float, "threshold": float}
     table = pd.DataFrame(rows, columns=list(types)).astype(types)
     return cut_takes(X, checked, table)
@@ -192,32 +196,31 @@ def _check_lengths(before, after, called):
             )
 
 
-def _search_takes(takes, propose, dissimilarity, threshold, coverage, progress):
-    """The hits of every take, and the threshold that holds for it."""
+def _search_takes(takes, paces, propose, dissimilarity, threshold, coverage, progress):
+    """The hits of every take, and the threshold that holds for it.
+
+    A pace is the number of frames of a take in a frame of the pattern.
+    """
     fixed = None if threshold is None or threshold == "auto" else max(threshold, _NO_SCORE)
     limit = dissimilarity.threshold(coverage) if fixed is None else -np.log(fixed)
     hopeless = float(np.exp(-_HOPELESS * limit))
     step, out = progress.stage("searching", len(takes)), []
-    for take in takes:
+    for take, pace in zip(takes, paces, strict=True):
         take = take.astype(np.float64, copy=False)
         lowest = 0.0 if threshold is None else hopeless
-        limits = propose.shortest, propose.longest
-        hits = search_windows(take, propose(take), dissimilarity, *limits, lowest)
+        limits, at_pace = propose.limits(pace), partial(dissimilarity, pace=pace)
+        hits = search_windows(take, propose(take, *limits), at_pace, *limits, lowest)
         level = threshold
         if fixed is None:
             u = -np.log([hit.score for hit in hits if hit.proposed >= hopeless])
-            level = float(np.exp(-dissimilarity.threshold_of_take(limit, u, len(take))))
+            level = float(np.exp(-dissimilarity.threshold_of_take(limit, u, len(take) / pace)))
         out.append((hits, level))
         step()
     return out
 
 
-def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
-    """Takes at the frame rate of the training set, ``X`` itself if none is resampled.
-
-    With the takes come the frames that were given in a frame that is searched, for each.
-    ``checked`` are the takes of ``X``, checked.
-    """
+def _paces_of(pattern, checked, frame_rate, pattern_rate):
+    """The number of frames of each take in a frame of the training set."""
     rates = [facts.get("frame_rate") for facts in checked.facts] or [None] * len(checked)
     if frame_rate is not None:
         n = len(checked)
@@ -240,9 +243,6 @@ def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
         1.0 if rate_of_pattern is None or rate is None else rate / rate_of_pattern for rate in rates
     ]
     paces = [1.0 if abs(pace - 1) <= SAME_RATE else pace for pace in paces]
-    if set(paces) == {1.0}:
-        return X, paces
-    searched = list(as_collection(X))
     for i, pace in enumerate(paces):
         if not 1 / _MOST <= pace <= _MOST:
             raise ValueError(
@@ -250,9 +250,7 @@ def _at_rate_of(pattern, X, checked, frame_rate, pattern_rate):
                 f"{rate_of_pattern:g}: one is more than {_MOST} times the other. Correct the wrong "
                 "one, attrs['frame_rate'], an index in seconds, frame_rate or pattern_rate."
             )
-        if pace != 1:
-            searched[i] = _resample(searched[i], checked[i], pace, rate_of_pattern)
-    return searched, paces
+    return paces
 
 
 def _frame_rate_of(pattern):
@@ -264,37 +262,6 @@ def _frame_rate_of(pattern):
     rates_of_steps = (facts_in_fit(step).get("frame_rate", ()) for step in steps)
     rates = next(filter(None, rates_of_steps), ())
     return rates[0] if len(rates) == 1 else None
-
-
-def _resample(x, array, pace, rate):
-    """A take, a table or an array, at another frame rate."""
-    n_steps = max(whole((len(array) - 1) / pace, "down"), 1)
-    times = np.arange(n_steps + 1) * pace
-    values = at_times(array, times).astype(array.dtype, copy=False)
-    if not isinstance(x, pd.DataFrame):
-        return values
-    out = pd.DataFrame(values, columns=x.columns).rename_axis(index=FRAME)
-    out.attrs = timeless(x) | {"frame_rate": rate}
-    return out
-
-
-def in_frames_given(hits, pace, n_frames):
-    """Hits in a resampled take, in order of time, in the frames of the take as it was given.
-
-    A hit has a start, a stop and a score. ``pace`` is the number of frames that were given in a
-    frame that was searched, and ``n_frames`` that of the take that was given.
-    """
-    if pace == 1 or not hits:
-        return hits
-    starts = [whole(start * pace) for start, _, _ in hits]
-    sizes = [whole((stop - 1 - start) * pace) + 1 for start, stop, _ in hits]
-    # Hits that touch may share a frame of a take of a lower rate.
-    return [
-        (start, min(start + size, limit), score)
-        for start, size, limit, (_, _, score) in zip(
-            starts, sizes, [*starts[1:], n_frames], hits, strict=True
-        )
-    ]
 
 
 class Hit(NamedTuple):
@@ -440,23 +407,26 @@ class Proposer:
         # The filter of velocities is as wide in a portion as in the pattern.
         share = (n_frames - 1) / (n_frames - 1 + 2 * self.trellis.width)
         self.features = features._replace(velocity_smoothing=share * features.velocity_smoothing)
-        lengths = synchronizer.lengths_
-        margin = _MARGIN if len(lengths) > 1 else _MARGIN_OF_ONE
-        self.shortest = max(_SHORTEST, whole(lengths.min() / margin, "down"))
-        self.longest = whole(lengths.max() * margin, "up")
-        # Typical numbers of frames at the time scales.
-        self.lengths = scales(self.shortest, self.longest)
+        self._lengths = synchronizer.lengths_
 
-    def __call__(self, take):
+    def limits(self, pace):
+        """The least and the largest number of frames of hits in a take of this pace."""
+        margin = _MARGIN if len(self._lengths) > 1 else _MARGIN_OF_ONE
+        shortest = max(_SHORTEST, whole(self._lengths.min() / margin * pace, "down"))
+        return shortest, max(shortest, whole(self._lengths.max() * margin * pace, "up"))
+
+    def __call__(self, take, shortest, longest):
         """Distinct windows of a take (n_frames, n_features): (n_windows, 2) of start and stop."""
-        lengths = self.lengths[self.lengths <= len(take)]
-        windows_of_scales = [self._at_scale(take, int(length)) for length in lengths]
+        # Typical numbers of frames at the time scales.
+        lengths = scales(shortest, longest)
+        lengths = lengths[lengths <= len(take)]
+        windows_of_scales = [self.at_scale(take, int(length)) for length in lengths]
         windows = np.concatenate([np.empty((0, 2), dtype=np.intp), *windows_of_scales])
         sizes = windows[:, 1] - windows[:, 0]
-        fits = (self.shortest <= sizes) & (sizes <= self.longest)
+        fits = (shortest <= sizes) & (sizes <= longest)
         return np.unique(windows[fits], axis=0)
 
-    def _at_scale(self, take, length):
+    def at_scale(self, take, length):
         """The best window of every portion, for a pattern of about this number of frames."""
         n_frames, width = self.base.shape[1], self.trellis.width
         pace = (length - 1) / (n_frames - 1)

@@ -133,12 +133,16 @@ class WindowDissimilarity:
         # Of equally good ones the highest.
         return float(levels[first_largest(gains)])
 
-    def __call__(self, take, windows):
-        """The dissimilarity of windows (n_windows, 2), start and stop, of a take."""
+    def __call__(self, take, windows, pace=1.0):
+        """The dissimilarity of windows (n_windows, 2), start and stop, of a take.
+
+        The pace is the number of its frames in a frame of the training trials.
+        """
         out = np.empty(len(windows))
         for rows in even_slices(len(windows), _WINDOW_BATCH):
             positions = self._positions([take[start:stop] for start, stop in windows[rows]])
-            out[rows] = self._measure(positions, windows[rows, 1] - windows[rows, 0])
+            lengths = (windows[rows, 1] - windows[rows, 0] - 1) / pace + 1
+            out[rows] = self._measure(positions, lengths)
         return out
 
     def _positions(self, trials):

@@ -2,7 +2,6 @@
 
 import copy
 import tracemalloc
-from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -24,7 +23,6 @@ from sklearn_motionsync.matching.warps import normalise
 from sklearn_motionsync.takes import find_trials
 from sklearn_motionsync.takes.search import (
     Proposer,
-    in_frames_given,
     search_windows,
 )
 from sklearn_motionsync.takes.windows import (
@@ -201,7 +199,7 @@ def test_proposer_has_the_smoothness_and_the_filter_of_the_method():
     width = learnt.features.velocity_smoothing * n_frames
     np.testing.assert_allclose(width, sync.features_.velocity_smoothing * 39)
     # What is nowhere long enough has no windows.
-    assert learnt(np.zeros((29, 3))).shape == (0, 2)
+    assert learnt(np.zeros((29, 3)), *learnt.limits(1.0)).shape == (0, 2)
 
 
 def test_proposals_are_the_best_paths_of_their_portions():
@@ -209,7 +207,6 @@ def test_proposals_are_the_best_paths_of_their_portions():
     table, mu, reach = step_table("velocity", 2), 0.1, 2
     proposer = Proposer(sync)
     proposer.trellis = Trellis(table, mu, reach, free=True)
-    proposer.lengths, proposer.shortest, proposer.longest = np.array([4]), 0, 9
     costs = dict(zip(table.steps, zip(*table[1:4], strict=True), strict=True))
     paths = list(oracle.all_free_paths(4, sorted(costs), 1, reach))
     take, expected = np.random.default_rng(0).standard_normal((12, 3)), set()
@@ -219,7 +216,7 @@ def test_proposals_are_the_best_paths_of_their_portions():
         best = min(paths, key=lambda q: oracle.path_cost(proposer.base[0], moving, q, costs, mu, 1))
         ends = start - reach + best[0], start - reach + best[-1] + 1
         expected.add(tuple(np.clip(ends, 0, 12).tolist()))
-    assert {tuple(window) for window in proposer(take).tolist()} == expected
+    assert {tuple(window) for window in proposer.at_scale(take, 4).tolist()} == expected
 
 
 @pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
@@ -311,7 +308,7 @@ def at_30():
 
 
 @pytest.mark.parametrize("rate", [7.5, 120])
-def test_takes_of_another_frame_rate_are_resampled(at_30, rate):
+def test_takes_of_another_frame_rate_have_hits_of_as_many_seconds(at_30, rate):
     take = table(TAKE, rate)
     trials, locations = find_trials(at_30, take)
     np.testing.assert_allclose(np.array(spans(locations)) * 30 / rate, TRUE, atol=6)
@@ -364,22 +361,6 @@ def test_rates_within_a_hundredth_are_one(at_30):
     take = table(TAKE, 30)
     found = find_trials(at_30, attributed(take.copy(), frame_rate=29.97))[1]
     pd.testing.assert_frame_equal(found, find_trials(at_30, take)[1])
-
-
-def test_hits_in_frames_given_keep_order_and_limits():
-    rng = np.random.default_rng(0)
-    for _ in range(300):
-        pace, n_given = rng.uniform(0.2, 6), int(rng.integers(900, 2000))
-        last = int((n_given - 1) / pace)
-        edges = np.sort(rng.choice(np.arange(0, last + 2, 12), 7, replace=False)).tolist()
-        hits = [(a, b - (k % 2), 0.5) for k, (a, b) in enumerate(pairwise(edges))]
-        found = in_frames_given(hits, pace, n_given)
-        for (start, stop, _), (a, b, _) in zip(found, hits, strict=True):
-            assert abs(start - a * pace) <= 0.5
-            assert abs(stop - 1 - (b - 1) * pace) <= 1.5
-            assert 0 <= start < stop <= n_given
-        assert all(a[1] <= b[0] for a, b in pairwise(found))
-    assert in_frames_given([(3, 12, 0.5)], 4.0, 90) == [(12, 45, 0.5)]
 
 
 # -- threshold and number of hits ------------------------------------------------------------------
