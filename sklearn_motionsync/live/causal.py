@@ -37,12 +37,6 @@ class CausalDerivative:
         self._filtered = np.zeros((2, *shape))
         self._from_rest, self._weight = from_rest, np.full((2, *shape), float(from_rest))
 
-    def restart(self, stream):
-        """Forget the past of one stream."""
-        self._last[stream], self._age[stream] = np.nan, 0
-        self._filtered[:, stream], self._weight[:, stream] = 0, self._from_rest
-        self._steady = False
-
     def step(self, sample):
         """Velocity by the sample, both (n_streams, n_features); NaN where it is unknown.
 
@@ -135,12 +129,7 @@ class CausalTrellis:
         self._states, self._others = self._tile.states(2), self._tile.states(2)
         self._energy = np.full(n_streams, self._tile.right[:, 0, -2].sum())
         self._rank = TIE[moving.dtype] * np.arange(trellis.width + 1.0)[:, np.newaxis]
-        self._begins = np.zeros(n_streams, dtype=bool)
         self.attempts = np.zeros(n_streams, dtype=np.intp)
-
-    def restart(self, stream):
-        """Start a new path of one stream at its next sample."""
-        self._begins[stream] = True
 
     def advance(self, samples, partial=None, moves=None):
         """Take one sample of every stream (n_streams, n_features).
@@ -153,7 +142,6 @@ class CausalTrellis:
         tile, p, high = self._tile, self.n_samples, self.trellis.width
         if not self._cyclic:
             high = int(min(high, self.trellis.slopes.max() * p))
-        self._begins |= p == 0
         local = tile.costs_of_sample(p, self._left(samples), 0, high)
         by_stream = local.reshape(len(local), high + 1, -1)
         self._energy += np.vecdot(samples, samples)
@@ -172,8 +160,11 @@ class CausalTrellis:
         if self._restart_cost < np.inf and p > 0:
             tile.take_row(self._others, p, local, 0, high)
             self._compare_attempts(p, moves)
-        if self._begins.any():
-            self._begin(p, by_stream)
+        if p == 0:
+            # A cycle begins anywhere.
+            unit, stop = self.trellis.unit_group, high + 1 if self._cyclic else 1
+            first = by_stream[unit, :stop] - self.trellis.groups[unit].penalty
+            self._inside(self._states, 0)[:stop] = first
         self.n_samples += 1
         if self._cyclic:
             # The last position is the first one.
@@ -204,18 +195,6 @@ class CausalTrellis:
     def _inside(self, states, p):
         first = self.trellis.centre
         return self._rows(states, p)[first : first + self.trellis.width + 1]
-
-    def _begin(self, p, costs):
-        """Begin the streams that do, given the local costs (n_groups, n_positions, n_streams)."""
-        unit, begins = self.trellis.unit_group, self._begins
-        for states in (self._states, self._others):
-            self._rows(states, p)[:, begins] = np.inf
-        # A cycle begins anywhere.
-        stop = costs.shape[1] if self._cyclic else 1
-        first = costs[unit, :stop, begins].T - self.trellis.groups[unit].penalty
-        self._inside(self._states, p)[:stop, begins] = first
-        self.attempts[begins] = 0
-        begins[:] = False
 
     def _compare_attempts(self, p, moves):
         """Go on with the other attempt of a stream where it is cheaper in row p."""

@@ -81,19 +81,10 @@ class Session:
 
     def __init__(self, reference, frame, time):
         frames = np.atleast_2d(frame)
-        self.time, self.n_streams = time, len(frames)
-        self._reference, self._shape = reference, frame.shape
+        self.time, self._shape = time, frame.shape
         self._streams = Streams(reference, *frames.shape)
         self._resampler = Resampler(reference.step, reference.n_frames, frames, time)
-        self._course = Course(
-            reference.n_frames, reference.duration, reference.cyclic, self.n_streams
-        )
-
-    def restart(self, stream):
-        """Begin another trial of one stream with the next frame."""
-        self._streams.restart(stream)
-        self._resampler.restart(stream)
-        self._course.restart(stream)
+        self._course = Course(reference.n_frames, reference.duration, reference.cyclic, len(frames))
 
     def step(self, frame, time):
         """Take a frame, and estimate the phases: a `LivePhase` of numbers, or of arrays."""
@@ -125,30 +116,25 @@ class Course:
 
     def __init__(self, n_frames, duration, cyclic, n_streams=1):
         self._last, self._duration, self._cyclic = n_frames - 1, duration, cyclic
-        # NaN: the stream begins with the next frame. The first cycle may begin anywhere.
-        self._begin, self._one_begins = np.full(n_streams, np.nan), True
-        self._time, self._share = np.nan, np.zeros(n_streams)
+        # None: streams begin with the next frame. The first cycle may begin anywhere.
+        self._begin, self._time, self._share = None, np.nan, np.zeros(n_streams)
         self._cycle = np.zeros(n_streams, dtype=np.intp)
         self._period = np.full(n_streams, float(duration))
-
-    def restart(self, stream):
-        """Begin another trial of one stream with the next frame."""
-        self._begin[stream], self._one_begins = np.nan, True
-        self._share[stream], self._cycle[stream], self._period[stream] = 0, 0, self._duration
 
     def follow(self, time, phase, cycle):
         """Take the phases and cycles (n_streams,) at a time."""
         self._time, self._share = time, phase / self._last
-        if self._one_begins or (cycle > self._cycle).any():
-            first, rises = np.isnan(self._begin), cycle > self._cycle
+        rises = cycle > self._cycle
+        if self._begin is None:
+            self._begin = np.full(len(phase), time, dtype=np.float64)
+        elif rises.any():
             # At the mean pace the phase was 0.
             begin = time - self._share * self._duration
             # The cycle before was whole if its beginning was seen, too.
             whole = rises & (self._cycle > 0) & (cycle - self._cycle == 1)
             period = np.clip(begin - self._begin, *np.multiply(_PERIODS, self._duration))
             self._period = np.where(whole, period, self._period)
-            self._begin = np.where(first, time, np.where(rises, begin, self._begin))
-            self._one_begins = False
+            self._begin = np.where(rises, begin, self._begin)
         self._cycle = np.array(cycle)
 
     def time_left(self):
@@ -160,8 +146,7 @@ class Course:
         share, duration = self._share, self._duration
         if self._cyclic:
             return (1 - share) * self._period
-        elapsed = np.where(np.isnan(self._begin), 0, self._time - self._begin)
-        by_time = np.maximum(duration - elapsed, 0)
+        by_time = np.maximum(duration - (self._time - self._begin), 0)
         return (1 - share) * by_time + share * duration * (1 - share)
 
 
@@ -188,22 +173,12 @@ class Streams:
         positions = np.arange(len(reference.moving) - reference.cyclic) / table.subframes
         self._phase_of_position = np.minimum(positions, self._last)
         # The phases of the last samples, the last one last.
-        self._phases = np.zeros((self._window + 1, n_streams))
-        self._n_samples = np.zeros(n_streams, dtype=np.intp)
+        self._phases, self._n_samples = np.zeros((self._window + 1, n_streams)), 0
         self._path_cost, self._fully_observed = np.zeros(n_streams), np.ones(n_streams)
         # The share of the last samples in which anything was observed.
         self._observed_share = np.ones(n_streams)
         # Of the features, the share that was observed in those samples.
         self._feature_share = np.ones(n_streams)
-
-    def restart(self, stream):
-        """Begin another trial of one stream with the next sample."""
-        self.trellis.restart(stream)
-        self._derivative.restart(stream)
-        self._n_samples[stream] = self._path_cost[stream] = self.mean_cost[stream] = 0
-        self._cycles[stream] = 0
-        self._feature_share[stream] = 1
-        self._phases[:, stream] = 0
 
     def update(self, sample):
         """Take a sample (n_streams, n_features), one frame of the clock after the one before."""
@@ -252,14 +227,14 @@ class Streams:
         ends, costs = self.trellis.best()
         now = self._phase_of_position[ends]
         if self.reference.cyclic:
-            before = np.where(self._n_samples > 0, self._phases[-1], now)
+            before = self._phases[-1] if self._n_samples else now
             now, turns = go_round(before, now, self._cycles, self._last, self._tolerance)
             self._cycles = np.maximum(self._cycles + turns, 0)
             # Phases of the window are those of this cycle, below 0 in the cycles before.
             self._phases -= self._last * turns
         self._phases = np.concatenate([self._phases[1:], now[np.newaxis]])
         self._n_samples += 1
-        weight, seen = 1 / np.minimum(self._n_samples, self._window), observed > 0
+        weight, seen = 1 / min(self._n_samples, self._window), observed > 0
         self._observed_share += weight * (seen - self._observed_share)
         # Per observed feature, so that hidden features make a stream neither like nor unlike.
         cost = (costs - self._path_cost) / np.where(seen, observed, 1)
@@ -269,8 +244,8 @@ class Streams:
 
     def _rates(self):
         """Slopes of the phases over the window; before the first sample the rate is 1."""
-        length = np.minimum(np.maximum(self._n_samples - 1, 0), self._window)
-        moved = self._phases[-1] - self._phases[-1 - length, np.arange(len(length))]
+        length = min(self._n_samples - 1, self._window)
+        moved = self._phases[-1] - self._phases[-1 - length]
         rate = (moved + self._window - length) / self._window
         return np.minimum(np.maximum(rate, 0), self._max_rate)
 
@@ -280,9 +255,7 @@ class Streams:
         if self.reference.cyclic:
             distances = np.minimum(distances, self._last - distances)
         mass = np.vecdot(probabilities, distances <= self._tolerance)
-        # A stream without samples is at the beginning, or anywhere in a cycle.
-        unseen = 1.0 - self.reference.cyclic
-        return np.where(self._n_samples > 0, self._observed_share * mass / excess**2, unseen)
+        return self._observed_share * mass / excess**2
 
     def _bounds(self, gains, excess):
         """Bounds of the phases of the last sample: (2, n_streams)."""
@@ -290,9 +263,7 @@ class Streams:
         temperature = self.reference.interval_temperature * excess
         temperature *= (np.maximum(excess / _UNUSUAL, 1) / self._feature_share) ** 2
         cyclic, phase = self.reference.cyclic, self._phases[-1]
-        edges = phase_bounds(gains[:, self._whole], temperature, phase, self._last, cyclic)
-        half = self._last / 2 * cyclic
-        return np.where(self._n_samples > 0, edges, [[-half], [half]])
+        return phase_bounds(gains[:, self._whole], temperature, phase, self._last, cyclic)
 
 
 class Resampler:
@@ -309,19 +280,10 @@ class Resampler:
         self._origin, self._next, self._time = time, 0.0, 0.0
         # The last values that were seen, and their times.
         self._seen, self._seen_at = np.full(frame.shape, np.nan), np.zeros(frame.shape)
-        self._restarted = []
         self.elapsed = 0.0
-
-    def restart(self, stream):
-        """Do not interpolate between the last frame of a stream and its next."""
-        self._restarted.append(stream)
 
     def add(self, frame, time):
         """Yield the samples (n_streams, n_features) up to a new frame of that shape."""
-        if self._restarted:
-            self._seen[self._restarted] = frame[self._restarted]
-            self._seen_at[self._restarted] = self._time
-            self._restarted = []
         time -= self._origin
         gap = (time - self._time) / self._step
         if gap > _FORGETTING * self._n_frames:

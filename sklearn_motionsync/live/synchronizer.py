@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -14,7 +13,6 @@ from ..inputs.facts import TIMELESS
 from ..inputs.numbers import check_magnitude
 from ..inputs.types import Indexed, NumbersLike, SupportsArray, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_input, names_of_input
-from ..inputs.wording import counted
 from ..matching.costs import step_table
 from ..matching.counting import first_largest
 from ..matching.filters import SMOOTHING
@@ -272,31 +270,10 @@ class OnlineSynchronizer(LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, 
             session = self._session = Session(self._reference, frame, time)
         return session.step(frame, time)
 
-    def reset(self, stream: int | Sequence[int] | np.ndarray | None = None) -> None:
-        """Begin another trial with the next frame, and count from 0 again.
-
-        Parameters
-        ----------
-        stream : int or array-like of int, default=None
-            Of several trials those that end, while the others go on. None: all of
-            them, and time begins again, too.
-        """
+    def reset(self) -> None:
+        """Begin other trials, and time, with the next frame, and count from 0 again."""
         check_is_fitted(self, "mean_")
-        if stream is None:
-            self._session = None
-            return
-        session = self._session
-        n_streams = 0 if session is None else session.n_streams
-        streams = np.atleast_1d(stream)
-        known = streams.dtype.kind in "iu" and np.isin(streams, np.arange(-n_streams, n_streams))
-        if streams.ndim > 1 or (len(streams) and not np.all(known)):
-            raise ValueError(
-                f"stream={stream!r} is not among {counted(n_streams, 'running trial')}: give "
-                "an index of these or several, or None for all."
-            )
-        if session is not None:
-            for n in streams:
-                session.restart(int(n))
+        self._session = None
 
     def time_left(self) -> Any:
         """Estimate the time until the trial ends, or the cycle that runs.

@@ -74,22 +74,6 @@ def test_missing_features_cost_nothing():
         np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
-def test_restart_changes_one_stream_only():
-    rng = np.random.default_rng(3)
-    bases, moving = rng.standard_normal((2, 12, 4)), rng.standard_normal((17, 4))
-    trellis = Trellis(step_table("velocity", 2, 2), 0.5, 8, running=True)
-    both, alone, late = (CausalTrellis(trellis, moving, n) for n in (2, 1, 1))
-    for p in range(12):
-        if p == 5:
-            both.restart(1)
-        both.advance(bases[:, p])
-        alone.advance(bases[:1, p])
-        if p >= 5:
-            late.advance(bases[1:, p])
-    np.testing.assert_allclose(both.costs[0], alone.costs[0], atol=1e-12)
-    np.testing.assert_allclose(both.costs[1], late.costs[0], atol=1e-12)
-
-
 @pytest.mark.parametrize(("sample", "place"), [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])
 def test_best_end_is_the_earliest_of_equal_ones(sample, place):
     trellis = Trellis(step_table(max_rate=2), 0.0, 8, running=True)
@@ -144,17 +128,6 @@ def test_constant_velocity_survives_gaps():
     # The first sample after a long gap has no velocity yet.
     assert np.isnan(found[70:91, 0]).all()
     np.testing.assert_allclose(found[91:, 0], 0.5, atol=1e-12)
-
-
-def test_restart_forgets_one_stream_only():
-    x = np.random.default_rng(2).standard_normal((20, 2, 3))
-    derivative = CausalDerivative(2.0, (2, 3))
-    for sample in x[:10]:
-        derivative.step(sample)
-    derivative.restart(1)
-    found = np.array([derivative.step(sample) for sample in x[10:]])
-    np.testing.assert_array_equal(found[:, 1], run(x[10:, 1:], 2.0)[:, 0])
-    np.testing.assert_array_equal(found[:, 0], run(x[:, :1], 2.0)[10:, 0])
 
 
 # -- cycles, and attempts that begin anew ---------------------------------------------------
@@ -263,5 +236,3 @@ def test_velocity_is_unknown_at_the_first_sample_unless_from_rest():
         assert np.isnan(derivative.step(np.full((1, 2), np.nan))).all()
     assert np.isnan(derivative.step(samples[5])).all()
     np.testing.assert_allclose(derivative.step(samples[6]), samples[6] - samples[5])
-    derivative.restart(0)
-    assert np.isnan(derivative.step(samples[5])).all()

@@ -97,11 +97,8 @@ def test_samples_lie_between_the_frames_that_show_a_feature(hidden):
     frames = rng.standard_normal((80, 2, 3))
     frames[rng.random(frames.shape) < hidden] = np.nan
     resampler, step, quarter = Resampler(1.25, 60, frames[0], times[0]), 1.25, 15 * 1.25
-    begun, at = [0, 0], times[0]
+    at = times[0]
     for k, (frame, time) in enumerate(zip(frames, times, strict=True)):
-        if k in (20, 60):
-            resampler.restart(k // 60)
-            begun[k // 60] = k
         found = list(resampler.add(frame, time))
         if k == 40:
             assert len(found) == 3 * 60 + 1
@@ -112,8 +109,7 @@ def test_samples_lie_between_the_frames_that_show_a_feature(hidden):
         for sample in found:
             assert times[k - 1] < at <= time + 1e-9 or k == 0
             for stream, feature in np.ndindex(2, 3):
-                values = frames[begun[stream] : k + 1, stream, feature]
-                since = times[begun[stream] : k + 1]
+                values, since = frames[: k + 1, stream, feature], times[: k + 1]
                 before = np.flatnonzero(~np.isnan(values[:-1]))
                 # Where nothing was seen before, or too long ago, it is hidden but at the frame.
                 last = before[-1] if len(before) else 0
@@ -236,27 +232,6 @@ def test_estimates_of_streams_equal_their_definitions():
 
 
 # -- streams and sessions -----------------------------------------------------------------
-
-
-def test_a_stream_begins_again_after_its_reset(fitted, live):
-    """Nothing is interpolated from its last frame on, and its time left is the mean duration."""
-    x, _ = trial(60, 0.0, 0.02, 6)
-    times, first, second = 1.7 * np.arange(20), x[::3], x[1::3]
-    ends = step_all(live, np.stack([first, first], axis=1), times)
-    before = live.time_left()
-    live.reset(1)
-    np.testing.assert_allclose(live.time_left(), [before[0], live.duration_])
-    # Before its first sample it is at the beginning, and goes on at the mean pace.
-    ahead = live.step(np.stack([first[-1], second[0]]), times[-1] + 0.01)
-    assert 0 <= ahead.phase[1] < 1
-    assert (ahead.rate[1], ahead.confidence[1]) == (1, 1)
-    assert ahead.lower[1] <= ahead.phase[1] <= ahead.upper[1] < 1
-    assert ahead.phase[0] == pytest.approx(ends[-1].phase[0], abs=0.1)
-    live.reset(1)
-    frames = np.stack([np.repeat(first[-1:], 20, axis=0), second], axis=1)
-    late = [step.phase[1] for step in step_all(live, frames, times + times[-1] + 1.7)]
-    (alone,) = fitted.track([second], [times])
-    np.testing.assert_allclose(late, alone.phase, atol=2)
 
 
 def test_copies_continue_independently(live):
@@ -386,14 +361,7 @@ def test_methods_before_fit_are_refused(method):
         getattr(OnlineSynchronizer(), method)(*[[0.0]] * (method == "step"))
 
 
-def test_unknown_streams_and_wrong_times_are_refused(fitted, live):
-    with pytest.raises(ValueError, match="not among 0 running trials"):
-        live.reset(0)
-    live.step(np.zeros((2, 3)))
-    live.reset([])
-    for stream in (2, -3, "a", 0.5, [[0, 1]]):
-        with pytest.raises(ValueError, match="not among 2 running trials"):
-            live.reset(stream)
+def test_wrong_times_are_refused(fitted):
     x, _ = trial(9)
     for X, times, message in (
         ([x], [None, None], r"one sequence of times .*, got 2 for 1"),
