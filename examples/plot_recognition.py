@@ -13,7 +13,12 @@ import pandas as pd
 from sklearn.metrics import ConfusionMatrixDisplay, roc_auc_score
 from sklearn.model_selection import GroupKFold, cross_val_predict
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionClassifier, DirectionCosines
+from sklearn_motionsync import (
+    ActionClassifier,
+    ActionModel,
+    DenseSynchronizer,
+    DirectionCosines,
+)
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay
 from sklearn_motionsync.model import find_departures
@@ -146,7 +151,9 @@ judge(list(shown.values())).set_index(pd.Index(shown, name="trial"))
 
 lifted = shown["left arm lifted"]
 most_like = judge([lifted])["most like"].iloc[0]
-of_class = make_pipeline(*pipe[:-1], *pipe[-1].model_of(most_like))
+of_class = make_pipeline(DirectionCosines(bunch.skeleton), DenseSynchronizer(30), ActionModel())
+members = np.flatnonzero(y == most_like)
+of_class.fit([X[i] for i in members], actionmodel__groups=bunch.actor[members])
 find_departures(of_class, [lifted]).head().round(1)
 
 # %%

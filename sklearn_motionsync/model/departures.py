@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from sklearn.base import BaseEstimator
+from sklearn.base import BaseEstimator, is_classifier
 
 from ..body.axes import direction_of
 from ..body.limbs import part_of_limb
@@ -68,8 +68,7 @@ def find_departures(
     ----------
     estimator : ActionModel, Pipeline with one, or ActionDetector
         Fitted. With a detector the rows are the reasons for its verdict: a trial that it accepts
-        has none, and one that it refuses has at least one. For the model of a class of a
-        classifier take ``classifier.model_of(label)``.
+        has none, and one that it refuses has at least one.
     X : trials
         As the estimator takes them.
     reference : trials, default=None
@@ -368,11 +367,11 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
         If the estimator is a classifier, or as from `view_of`.
     """
     classifier = flat_steps(estimator)[-1]
-    if hasattr(classifier, "model_of"):
+    if is_classifier(classifier):
         raise ValueError(
-            f"{caller} compares with one model, and {type(classifier).__name__} has one of each "
-            "class. Give that of a class: classifier.model_of(label), behind the steps before it, "
-            "as make_pipeline(*pipe[:-1], *pipe[-1].model_of(label))."
+            f"{caller} compares with one model, and {type(classifier).__name__} has several "
+            "classes. Fit one on the trials of a class: make_pipeline(*pipe[:-1], "
+            "DenseSynchronizer(), ActionModel())."
         )
     expected = _Expected.of(estimator, features)
     view = expected.view.of(X, params, caller)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Hashable
 from contextlib import suppress
 from numbers import Integral, Real
 from typing import Literal, Self
@@ -12,15 +10,12 @@ import numpy as np
 import pandas as pd
 from scipy.special import softmax
 from sklearn.base import BaseEstimator, ClassifierMixin
-from sklearn.pipeline import Pipeline
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.types import Labels, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.counting import first_largest
-from ..model.action_model import ActionModel
-from ..synchronizers.dense import DenseSynchronizer
 from ..utils.groups import (
     encode_classes,
     encode_groups,
@@ -209,8 +204,6 @@ class ActionClassifier(LongWorkMixin, SequenceLevelMixin, ClassifierMixin, BaseE
         self._regression, self.temperature_ = regression, temperature
         self.held_out_, self.held_out_gain_ = held_out, gain
         self._kernel, self.weights_ = kernel, kernel.weights
-        # Copies, which do not change with the user's arrays.
-        self._training = [np.array(x) for x in trials], codes, groups
         return self
 
     def predict(self, X: TrialsLike) -> np.ndarray:
@@ -349,54 +342,6 @@ class ActionClassifier(LongWorkMixin, SequenceLevelMixin, ClassifierMixin, BaseE
                 "trials, and two groups, of two classes, or a number as reject_below."
             )
         return float(np.quantile(known, 1 - coverage) + self.held_out_gain_)
-
-    def model_of(self, label: Hashable) -> Pipeline:
-        """Fit a model of a class, to explain a prediction.
-
-        It does not decide: trials of other classes that are synchronised to its pattern
-        resemble it.
-
-        Parameters
-        ----------
-        label : str or number
-            One of ``classes_``.
-
-        Returns
-        -------
-        Pipeline
-            A `DenseSynchronizer` and an `ActionModel`, fitted on the trials of the class.
-
-        Raises
-        ------
-        ValueError
-            If there is no such class, or it has one trial only.
-        """
-        check_is_fitted(self, "classes_")
-        trials, codes, groups = self._training
-        match = np.flatnonzero(self.classes_ == label)
-        if not len(match):
-            raise ValueError(
-                f"There is no class {label!r}; the classes are {self.classes_.tolist()}."
-            )
-        members = np.flatnonzero(codes == match[0])
-        if len(members) < 2:
-            raise ValueError(f"The class {label!r} has one trial: a model needs at least two.")
-        X: TrialsLike
-        X = arrays = [trials[i] for i in members]
-        names = getattr(self, "feature_names_in_", None)
-        if self._fitted_on_rows:
-            X = np.stack([x[:, 0] for x in arrays])
-        elif names is not None:
-            X = [pd.DataFrame(x, columns=names) for x in arrays]
-        if groups is not None:
-            groups = groups[members] if len(np.unique(groups[members])) > 1 else None
-        synchronizer = DenseSynchronizer(self.n_frames, n_jobs=self.n_jobs)
-        with warnings.catch_warnings():
-            # One class may move one feature only; units are a matter of all classes.
-            warnings.filterwarnings("ignore", ".* of the energy that is compared", UserWarning)
-            synchronised = synchronizer.fit_transform(X)
-        model = ActionModel().fit(synchronised, groups=groups)
-        return Pipeline([("densesynchronizer", synchronizer), ("actionmodel", model)])
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

@@ -14,8 +14,6 @@ from sklearn.model_selection import GridSearchCV, GroupKFold, cross_validate
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionClassifier,
-    ActionModel,
-    DenseSynchronizer,
     DirectionCosines,
     to_frame,
 )
@@ -194,11 +192,10 @@ def test_fitted_classifier_does_not_share_the_training_arrays(known):
     X, y, _ = known
     mine = [x.copy() for x in X]
     classifier = ActionClassifier(n_frames=20).fit(mine, y)
-    before = classifier.model_of("rise")[-1].mean_, classifier.predict_proba(X)
+    before = classifier.predict_proba(X)
     for x in mine:
         x[:] = 0
-    np.testing.assert_array_equal(classifier.model_of("rise")[-1].mean_, before[0])
-    np.testing.assert_array_equal(classifier.predict_proba(X), before[1])
+    np.testing.assert_array_equal(classifier.predict_proba(X), before)
 
 
 # -- unknown actions ---------------------------------------------------------------------
@@ -331,8 +328,6 @@ def test_one_trial_a_class(known, new):
     classifier = ActionClassifier(n_frames=30).fit(X, y)
     assert classifier.score(new[0], new[1]) > 0.9
     assert np.isfinite(classifier.predict_proba(new[0])).all()
-    with pytest.raises(ValueError, match="The class 'rise' has one trial: a model needs"):
-        classifier.model_of("rise")
     two = ActionClassifier(n_frames=8).fit(X[:2], y[:2])
     assert two.temperature_ == pytest.approx(4)
     with pytest.raises(ValueError, match="There is no threshold, as no trial could be held"):
@@ -394,39 +389,19 @@ def test_groups_are_routed_in_cross_validation_and_searches(bends):
         assert search.fit(X, y, groups=people).best_score_ > 0.9
 
 
-def test_tables_reach_the_models_of_classes(bends):
+def test_tables_reach_the_classifier(bends):
     X, y, _, pipe = bends
     table = to_frame(X, columns=pipe[0].skeleton.column_names)
     framed = clone(pipe).set_output(transform="pandas").fit(table, y)
     assert list(framed[-1].feature_names_in_)[:2] == ["pelvis_height", "hip_x"]
-    assert list(framed[-1].model_of("half")[0].feature_names_in_)[:1] == ["pelvis_height"]
 
 
-# -- models of classes --------------------------------------------------------------------------
-
-
-def test_model_of_a_class_is_fitted_on_its_trials(bends):
-    X, y, people, pipe = bends
-    mine = [X[i] for i in np.flatnonzero(y == "half")]
-    expected = make_pipeline(pipe[0], DenseSynchronizer(15), ActionModel())
-    expected.fit(mine, actionmodel__groups=people[y == "half"])
-    explained = pipe[-1].model_of("half")
-    np.testing.assert_array_equal(explained[-1].mean_, expected[-1].mean_)
-    assert explained[-1].threshold_ == expected[-1].threshold_
-    with pytest.raises(ValueError, match=r"no class 'jump'; the classes are \['bend', 'half'\]"):
-        pipe[-1].model_of("jump")
-
-
-def test_departures_from_the_model_of_a_class(bends):
+def test_departures_need_the_model_of_one_class(bends):
     X, *_, pipe = bends
-    half = make_pipeline(pipe[0], *pipe[-1].model_of("half"))
-    wrong = X[13].copy()
-    wrong[5:12, 3 * pipe[0].skeleton.index_of("left_wrist") + 1] += 0.4
-    assert find_departures(half, [wrong])["limb"][0] == "left_forearm"
-    with pytest.raises(ValueError, match=r"find_departures compares with one model, .*model_of"):
-        find_departures(pipe, [wrong])
+    with pytest.raises(ValueError, match=r"find_departures compares with one model, .*ActionModel"):
+        find_departures(pipe, X[:1])
     with pytest.raises(ValueError, match=r"SkeletonDisplay.from_departures compares with one"):
-        SkeletonDisplay.from_departures(pipe, [wrong])
+        SkeletonDisplay.from_departures(pipe, X[:1])
 
 
 # -- people -----------------------------------------------------------------------------
