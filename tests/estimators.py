@@ -127,9 +127,9 @@ def outputs(estimator, X):
     if isinstance(estimator, OnlineSynchronizer):
         results += list(zip(*estimator.track(X), strict=True))
     if isinstance(estimator, MotionTracker):
-        # A tracker also takes single frames and gaps: what it is given here is checked before.
-        tracks = estimator.track([x[::4] for x in estimator.check_trials(X)])
-        results += [np.stack([track.poses for track in tracks])]
+        # A tracker also takes single takes and gaps: what it is given here is checked before.
+        estimator.check_trials(X)
+        results += [np.stack([track.poses[:9] for track in estimator.track(X)])]
     if hasattr(estimator, "score_samples"):
         results += [estimator.score_samples(X), estimator.decision_function(X)]
         results += [estimator.predict(X)]

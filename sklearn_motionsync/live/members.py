@@ -74,7 +74,7 @@ class Track(NamedTuple):
 class PooledFilter:
     """A Kalman filter of deviations from the mean of all phases: it knows no phase.
 
-    ``accepted`` (n_observed,) are the observations of the last frame that were used, and
+    ``accepted`` (n_features,) are the observations of the last frame that were used, and
     ``innovation`` is their NIS, None without any.
     """
 
@@ -87,7 +87,7 @@ class PooledFilter:
         mean = self.model.pooled_mean + self.deviations.means[0, 0]
         return mean, self.deviations.pose_covariance
 
-    def update(self, values, dt, observer):
+    def update(self, values, dt):
         """Take an observation, a time after the one before."""
         if dt > 0:
             self.deviations.predict(dt)
@@ -95,9 +95,8 @@ class PooledFilter:
         self.accepted, self.innovation = np.zeros_like(seen), None
         if not seen.any():
             return
-        rows, noise = observer.of(seen)
-        residuals = (values[seen] - rows @ self.model.pooled_mean)[np.newaxis]
-        update = self.deviations.correct(residuals, rows, noise, self.model.gate)
+        model, residuals = self.model, (values - self.model.pooled_mean)[np.newaxis, seen]
+        update = self.deviations.correct(residuals, seen, model.noise, model.gate)
         if update is not None:
             self.accepted, self.innovation = seen, float(update.nis[0])
 
@@ -109,9 +108,9 @@ class RunningTake:
     innovations of both, of which 1 is expected.
     """
 
-    def __init__(self, model, seed, time, n_observed):
+    def __init__(self, model, seed, time):
         self.model = model
-        self.phases = ParticleFilter(model, seed, time, n_observed)
+        self.phases = ParticleFilter(model, seed, time)
         self.pooled = PooledFilter(model)
         self.evidence = np.ones(2)
 
@@ -120,20 +119,20 @@ class RunningTake:
         """Of the last frame."""
         return self.phases.time
 
-    def update(self, values, time, observer):
+    def update(self, values, time):
         """Take an observation; parameters as of `ParticleFilter.update`."""
         dt = time - self.time
-        self.phases.update(values, time, observer)
-        self.pooled.update(values, dt, observer)
+        self.phases.update(values, time)
+        self.pooled.update(values, dt)
         for k, member in enumerate((self.phases, self.pooled)):
             if member.innovation is not None:
                 memory = self.model.clock.memory
                 now = exponential_average(self.evidence[k], member.innovation, dt, memory)
                 self.evidence[k] = now
 
-    def step(self, values, time, observer):
+    def step(self, values, time):
         """Take an observation; the `Track` of its frame."""
-        self.update(values, time, observer)
+        self.update(values, time)
         particles = self.phases.particles
         return Track(
             *pool((self.phases.estimate, self.pooled.estimate), self.evidence, self.model),
@@ -169,28 +168,27 @@ def stack_frames(frames, dtype):
     return Track(*(x.astype(dtype, copy=False) for x in (poses, covariances)), *numbers)
 
 
-def filter_take(model, seed, values, times, observer):
+def filter_take(model, seed, values, times):
     """The filtered frames of a take, each given the observations up to it.
 
     It is called, and returns, as `smooth_take` does.
     """
-    running = RunningTake(model, seed, times[0], len(observer.matrix))
-    return [running.step(*frame, observer) for frame in zip(values, times, strict=True)]
+    running = RunningTake(model, seed, times[0])
+    return [running.step(now, time) for now, time in zip(values, times, strict=True)]
 
 
-def smooth_take(model, seed, values, times, observer):
+def smooth_take(model, seed, values, times):
     """The smoothed frames of a take, each a `Track` given all observations.
 
-    ``values`` (n_frames, n_observed) were seen by an `Observer` at ``times`` (n_frames,). Paths of
-    phases are drawn by backward simulation from the particles of the filter. Along each path the
-    deviations are smoothed; the paths have equal weights. So are those of the member that knows no
-    phase.
+    ``values`` (n_frames, n_features) were seen at ``times`` (n_frames,). Paths of phases are drawn
+    by backward simulation from the particles of the filter. Along each path the deviations are
+    smoothed; the paths have equal weights. So are those of the member that knows no phase.
     """
-    running = RunningTake(model, seed, times[0], values.shape[1])
+    running = RunningTake(model, seed, times[0])
     history, accepted, evidence = [], [], []
     for now, time in zip(values, times, strict=True):
         dt = time - running.time
-        running.update(now, time, observer)
+        running.update(now, time)
         phases = running.phases
         history.append(HistoryFrame(dt, phases.particles, phases.initial, phases.lost))
         accepted.append([np.where(m.accepted, now, np.nan) for m in (phases, running.pooled)])
@@ -209,8 +207,8 @@ def smooth_take(model, seed, values, times, observer):
         history,
         paths,
         evidence,
-        smooth_deviations(model.process, on_paths, observer),
-        smooth_deviations(model.pooled, without, observer),
+        smooth_deviations(model.process, on_paths, model.noise),
+        smooth_deviations(model.pooled, without, model.noise),
         strict=True,
     )
     return [_smooth_frame(model, *frame) for frame in smoothed]
@@ -256,7 +254,7 @@ class PathFrame(NamedTuple):
 
     ``dt`` is the time since the frame before, of which nothing is known if it is ``initial``.
     Deviations are from ``expected`` (n_paths, n_features), and change by ``jumps`` of that shape
-    where it changes. ``values`` (n_observed,) are NaN where nothing was accepted.
+    where it changes. ``values`` (n_features,) are NaN where nothing was accepted.
     """
 
     dt: float
@@ -293,7 +291,7 @@ def _log_transition(model, before, after, path):
     return np.where(particles.restarted[path, np.newaxis], at_end, log_density)
 
 
-def smooth_deviations(process, frames, observer):
+def smooth_deviations(process, frames, noise):
     """Poses of several hypotheses given all observations, and their common covariance.
 
     Of each `PathFrame` there are the poses (n_paths, n_features), and the covariance. That is the
@@ -303,10 +301,10 @@ def smooth_deviations(process, frames, observer):
     blocks = [slice(i, i + _BLOCK) for i in range(0, len(frames), _BLOCK)]
     states = [DeviationFilter(process, len(frames[0].expected))]
     for block in blocks[:-1]:
-        states.append(_filter_block(frames[block], observer, states[-1])[1])
+        states.append(_filter_block(frames[block], noise, states[-1])[1])
     out, later = [], None
     for block, state in zip(blocks[::-1], states[::-1], strict=True):
-        filtered, _ = _filter_block(frames[block], observer, state)
+        filtered, _ = _filter_block(frames[block], noise, state)
         for frame, (poses, columns, update) in reversed(
             list(zip(frames[block], filtered, strict=True))
         ):
@@ -320,7 +318,7 @@ def smooth_deviations(process, frames, observer):
     return out[::-1]
 
 
-def _filter_block(frames, observer, state):
+def _filter_block(frames, noise, state):
     """The Kalman filter on from a state, a `DeviationFilter` that stays as it is.
 
     Returns a list of filtered frames, and the state after them. A filtered frame has the poses
@@ -337,8 +335,7 @@ def _filter_block(frames, observer, state):
             running.means[0] += frame.jumps
         update, seen = None, ~np.isnan(frame.values)
         if seen.any():
-            rows, noise = observer.of(seen)
-            update = running.correct(frame.values[seen] - frame.expected @ rows.T, rows, noise)
+            update = running.correct((frame.values - frame.expected)[:, seen], seen, noise)
         width = frame.expected.shape[1]
         columns = running.covariance[:, :width].copy()
         filtered.append((frame.expected + running.means[0], columns, update))
@@ -357,7 +354,8 @@ def _adjoint_step(process, frame, update, later):
         later = np.zeros((n_paths, 2 * width)), np.zeros((2 * width, 2 * width))
     adjoint, information = later
     if update is not None:
-        rows, rest = update.obs_rows, np.eye(2 * width)
+        rest, rows = np.eye(2 * width), np.zeros((len(update.gain_rows), width))
+        rows[:, update.seen] = update.whiten
         rest[:, :width] -= update.gain_rows.T @ rows
         adjoint, information = adjoint @ rest, rest.T @ information @ rest
         adjoint[:, :width] -= update.whitened @ rows
@@ -385,22 +383,22 @@ class ParticleFilter:
 
     All particles share one covariance of their deviations, which depends on what is observed and
     not on the phase; so one Kalman gain serves them all. ``time`` is that of the first frame, which
-    ``update`` still has to take, and then of the last one; ``n_observed`` counts its numbers.
+    ``update`` still has to take, and then of the last one.
 
     ``particles`` are weighted by the last frame, and ``initial`` tells whether they know nothing of
     what was before it. ``expected`` (n_particles, n_features) is the mean trial at their phases.
-    ``accepted`` (n_observed,) are the observations of the last frame that were used, and
+    ``accepted`` (n_features,) are the observations of the last frame that were used, and
     ``innovation`` is their NIS, the mean over the particles before they were weighted; None without
     any.
     """
 
-    def __init__(self, model, seed, time, n_observed):
+    def __init__(self, model, seed, time):
         self.model, self.rng = model, np.random.default_rng(seed)
         self.deviations = DeviationFilter(model.process, model.n_particles)
         self.time, self.lost = time, False
         n = model.n_particles
         elsewhere = np.arange(n) % _ELSEWHERE == _ELSEWHERE - 1
-        self._initialise(np.where(elsewhere, np.linspace(0, model.clock.last, n), 0.0), n_observed)
+        self._initialise(np.where(elsewhere, np.linspace(0, model.clock.last, n), 0.0))
 
     @property
     def estimate(self):
@@ -412,40 +410,37 @@ class ParticleFilter:
         off *= np.sqrt(weights)[:, np.newaxis]
         return pose, self.deviations.pose_covariance + off.T @ off
 
-    def update(self, values, time, observer):
-        """Take an observation (n_observed,), NaN where nothing is seen.
+    def update(self, values, time):
+        """Take an observation (n_features,), NaN where nothing is seen.
 
         Its time, in frames of the training trials, is later than that of the frame before.
         """
         dt, self.time = time - self.time, time
         self.since_search += dt
-        n_observed = len(observer.matrix)
-        if self.slopes.width != n_observed:
-            self.slopes = CausalSlopes(self.model.n_particles, n_observed, self.model.clock.window)
         if self.lost and self.since_search > _RETRY * self.model.clock.memory:
             # Over the whole clock.
             n = self.model.n_particles
             phases = (self.rng.random() + np.arange(n)) / n * self.model.clock.last
-            self._initialise(phases, self.slopes.width)
+            self._initialise(phases)
             # The phase stays lost until later observations agree with it.
             self.nis = self.model.nis_limits
         elif dt > 0:
-            self._predict(dt, observer.matrix)
+            self._predict(dt)
         self.expected = at_times(self.model.mean, self.particles.phases)
         seen = ~np.isnan(values)
         self.accepted, self.innovation = np.zeros_like(seen), None
         if seen.any():
-            self._observe(values, seen, observer, dt)
+            self._observe(values, seen, dt)
 
-    def _initialise(self, phases, n_observed):
+    def _initialise(self, phases):
         """Begin at these phases, without knowledge of the deviations."""
         model, n = self.model, len(phases)
         self.particles = Particles.uniform(phases, model.rates.draw(self.rng, n))
         self.deviations.begin(n)
-        self.slopes = CausalSlopes(n, n_observed, model.clock.window)
+        self.slopes = CausalSlopes(n, model.mean.shape[1], model.clock.window)
         self.nis, self.since_search, self.initial = np.ones(2), 0.0, True
 
-    def _predict(self, dt, matrix):
+    def _predict(self, dt):
         """Resample the particles if need be, and let a time pass."""
         model, particles = self.model, self.particles
         if particles.effective_size < _MIN_EFFECTIVE * model.n_particles:
@@ -461,13 +456,12 @@ class ParticleFilter:
         jump = model.mean[-1] - model.mean[0]
         self.deviations.means[0, self.particles.restarted] += jump
         self.slopes.advance(dt)
-        self.slopes.shift(self.particles.restarted, matrix @ jump)
+        self.slopes.shift(self.particles.restarted, jump)
 
-    def _observe(self, values, seen, observer, dt):
+    def _observe(self, values, seen, dt):
         """Correct the deviations and the weights, unless the observation is outside the gate."""
-        model, (rows, noise) = self.model, observer.of(seen)
-        residuals = values[seen] - self.expected @ rows.T
-        update = self.deviations.correct(residuals, rows, noise, model.gate)
+        model, residuals = self.model, (values - self.expected)[:, seen]
+        update = self.deviations.correct(residuals, seen, model.noise, model.gate)
         if update is None:
             self._update_nis(2 * model.nis_limits, dt)
             return
@@ -475,19 +469,20 @@ class ParticleFilter:
         self.innovation = float(self.particles.weights @ update.nis)
         self.slopes.add(residuals, seen)
         # Of the pose, from the mean.
-        spread = rows @ self.model.process.covariance @ rows.T + noise
+        spread = (model.process.covariance + model.noise)[np.ix_(seen, seen)]
         whitened = whitening(spread) @ (self.particles.weights @ residuals)
-        pose_nis = self._shrink_nis(whitened @ whitened / len(rows), len(rows))
+        pose_nis = self._shrink_nis(whitened @ whitened / len(whitened), len(whitened))
         known = self.slopes.have_slopes(seen)
-        velocity_nis = self._reweight(known, observer, dt) if known.any() else self.nis[0]
+        velocity_nis = self._reweight(known, dt) if known.any() else self.nis[0]
         self._update_nis(np.array([velocity_nis, pose_nis]), dt)
 
-    def _reweight(self, known, observer, dt):
-        """Weigh the particles by the velocities with this mask (n_observed,); their NIS."""
-        model, clock, (rows, noise) = self.model, self.model.clock, observer.of(known)
+    def _reweight(self, known, dt):
+        """Weigh the particles by the velocities with this mask (n_features,); their NIS."""
+        model, clock, block = self.model, self.model.clock, np.ix_(known, known)
         slopes, shares = self.slopes.fit(known)
         deviations = np.sqrt(shares)
-        covariance = rows @ model.velocities @ rows.T + noise * np.outer(deviations, deviations)
+        noise = model.noise[block] * np.outer(deviations, deviations)
+        covariance = model.velocities[block] + noise
         distances = squared_norms(slopes @ whitening(covariance).T)
         # Evidence is weighted by its duration, so that the frame rate does not matter.
         share = 100 * min(dt, clock.window) / clock.duration
@@ -496,7 +491,8 @@ class ParticleFilter:
         top = log_weights.max()
         log_weights -= top + np.log(np.exp(log_weights - top).sum())
         self.particles = self.particles._replace(log_weights=log_weights)
-        return self._shrink_nis(self.particles.weights @ distances / len(rows), len(rows))
+        n_known = len(shares)
+        return self._shrink_nis(self.particles.weights @ distances / n_known, n_known)
 
     def _shrink_nis(self, nis, n):
         """A mean of n squares, drawn towards 1 to vary as that of all features."""

@@ -76,14 +76,14 @@ class TrackerModel(NamedTuple):
         # Causal velocities (n, P - 1, n_features), and their variances by unit noise (P - 1,); and
         # the largest NIS of a frame, of a Kalman filter of each take at its own phase.
         causal, fits, seen = CausalSlopes(n, width, clock.window), [], np.ones(width, dtype=bool)
-        running, rows, largest = DeviationFilter(process, n), np.eye(width), 0.0
+        running, largest = DeviationFilter(process, n), 0.0
         for p in range(n_frames):
             causal.advance(step)
             causal.add(deviations[:, p], seen)
             if p:
                 fits.append(causal.fit(seen))
                 running.predict(step)
-            update = running.correct(deviations[:, p], rows, noise)
+            update = running.correct(deviations[:, p], seen, noise)
             largest = max(largest, float(update.nis.max()))
         slopes = np.stack([values for values, _ in fits], axis=1)
         unit_noise = np.array([variances[0] for _, variances in fits])
@@ -365,17 +365,19 @@ class KalmanUpdate(NamedTuple):
 
     Parameters
     ----------
+    seen : ndarray of bool, shape (n_features,)
+    whiten : ndarray, shape (n_seen, n_seen)
+        ``W``.
     whitened : ndarray, shape (n, n_seen)
         Whitened innovations ``W v`` of each hypothesis.
     gain_rows : ndarray, shape (n_seen, 2 n_features)
         ``gain_rows' W v = K v``, with the Kalman gain ``K``.
-    obs_rows : ndarray, shape (n_seen, n_features)
-        ``W H``, the whitened observation matrix.
     """
 
+    seen: np.ndarray
+    whiten: np.ndarray
     whitened: np.ndarray
     gain_rows: np.ndarray
-    obs_rows: np.ndarray
 
     @property
     def nis(self):
@@ -419,28 +421,27 @@ class DeviationFilter:
         """Let a time pass."""
         self.means, self.covariance = self.process.predict(self.means, self.covariance, dt)
 
-    def correct(self, residuals, rows, noise, gate=np.inf):
+    def correct(self, residuals, seen, noise, gate=np.inf):
         """Take an observation, unless its NIS is beyond the gate of every hypothesis.
 
-        ``residuals`` (n, n_seen) are from what each hypothesis expects without a deviation;
-        ``rows`` (n_seen, n_features) and ``noise`` are those of the `Observer`. Returns the
-        `KalmanUpdate`, or None if the observation is ignored.
+        ``residuals`` (n, n_seen) of the features with the mask ``seen`` are from what each
+        hypothesis expects without a deviation; ``noise`` is the covariance of that of all features.
+        Returns the `KalmanUpdate`, or None if the observation is ignored.
         """
-        innovations = residuals - self.means[0] @ rows.T
-        width = rows.shape[1]
+        width, innovations = len(seen), residuals - self.means[0][:, seen]
         # What overflows is outside the gate.
         with np.errstate(over="ignore", invalid="ignore"):
-            cross_covariance = self.covariance[:, :width] @ rows.T
-            innovation_covariance = rows @ cross_covariance[:width] + noise
-            innovation_covariance[np.diag_indices(len(rows))] *= 1 + _MARGIN
+            cross_covariance = self.covariance[:, :width][:, seen]
+            innovation_covariance = cross_covariance[:width][seen] + noise[np.ix_(seen, seen)]
+            innovation_covariance[np.diag_indices(len(innovation_covariance))] *= 1 + _MARGIN
             whiten = whitening(innovation_covariance)
             gain_rows = whiten @ cross_covariance.T
-            update = KalmanUpdate(innovations @ whiten.T, gain_rows, whiten @ rows)
+            update = KalmanUpdate(seen, whiten, innovations @ whiten.T, gain_rows)
             covariance = self.covariance - gain_rows.T @ gain_rows
             if not (update.nis <= gate).any():
                 return None
         # The Kalman gain times the innovations.
-        gains = gain_rows.reshape(len(rows), 2, width).swapaxes(0, 1)
+        gains = gain_rows.reshape(len(gain_rows), 2, width).swapaxes(0, 1)
         self.means = self.means + update.whitened @ gains
         self.covariance = covariance
         return update

@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from ..inputs.facts import TIMELESS
 from ..inputs.numbers import LARGEST, SMALLEST, as_numbers, check_finite, check_names
+from ..inputs.validation import check_input
 from .causal import CausalDerivative
 
 # Shares of the clock: the window of rate and cost, and how near a phase counts as right.
@@ -443,13 +445,31 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
     return frames
 
 
-def times_of_each(times, n):
-    """A list with the times of each of n trials, or None for each without times."""
-    if times is None:
-        return [None] * n
+def check_recordings(estimator, X, times, on_rows):
+    """Whole takes in double precision, in which NaN is not seen, and their times, both checked.
+
+    The times, of each take, are as for `check_times`, with the frame rate of the estimator; it was
+    fitted ``on_rows``, or not.
+    """
+    takes = check_input(
+        estimator,
+        X,
+        reset=False,
+        level="sequence",
+        on_rows=on_rows,
+        finite="allow-nan",
+        facts=None if times is None else TIMELESS,
+        timed=times is not None,
+    )
+    n = len(takes)
+    times = [None] * n if times is None else times
     count = len(times) if np.iterable(times) else "none"
     if count != n:
         raise ValueError(
             f"There must be one sequence of times for each trial, got {count} for {n}."
         )
-    return list(times)
+    checked_times = [
+        check_times(t, len(x), estimator.frame_rate, takes.called(i))
+        for i, (x, t) in enumerate(zip(takes, times, strict=True))
+    ]
+    return [x.astype(np.float64) for x in takes], checked_times

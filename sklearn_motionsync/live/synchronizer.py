@@ -9,10 +9,9 @@ import numpy as np
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, clone
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.facts import TIMELESS
 from ..inputs.numbers import check_magnitude
 from ..inputs.types import Indexed, NumbersLike, SupportsArray, TrialsLike, ValuesLike
-from ..inputs.validation import SequenceLevelMixin, check_input, names_of_input
+from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..matching.costs import step_table
 from ..matching.counting import first_largest
 from ..matching.filters import SMOOTHING
@@ -30,12 +29,12 @@ from .stream import (
     LivePhase,
     Session,
     check_observations,
+    check_recordings,
     check_times,
     gains_of,
     phase_bounds,
     phase_probabilities,
     stack_phases,
-    times_of_each,
     window_length,
 )
 
@@ -318,20 +317,8 @@ class OnlineSynchronizer(LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, 
             As from ``step``; or if there are not as many times as trials.
         """
         check_is_fitted(self, "mean_")
-        trials = check_input(
-            self,
-            X,
-            reset=False,
-            level="sequence",
-            on_rows=self._fitted_on_rows,
-            finite="allow-nan",
-            facts=None if times is None else TIMELESS,
-            timed=times is not None,
-        )
-        tracks, times_of = [], times_of_each(times, len(trials))
-        for i, (x, t) in enumerate(zip(trials, times_of, strict=True)):
-            t = check_times(t, len(x), self.frame_rate, trials.called(i))
-            frames = x.astype(np.float64)
+        tracks = []
+        for frames, t in zip(*check_recordings(self, X, times, self._fitted_on_rows), strict=True):
             session = Session(self._reference, frames[0], t[0])
             tracks.append(stack_phases(list(map(session.step, frames, t))))
         return tracks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from numbers import Integral, Real
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator, clone
@@ -13,11 +13,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..body.joint_noise import JointNoise
 from ..inputs.collections import as_collection
-from ..inputs.facts import TIMELESS, check_facts, facts_of
-from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude
-from ..inputs.recorded import warn_of_rows
-from ..inputs.tables import as_pandas, labels_of, name_trial
-from ..inputs.types import Indexed, Labels, NumbersLike, RandomState, TrialsLike, ValuesLike
+from ..inputs.numbers import LARGEST
+from ..inputs.types import Indexed, Labels, RandomState, TrialsLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import check_match
@@ -26,14 +23,14 @@ from ..utils.parallel import LongWorkMixin, one_blas_thread
 from ..utils.parameters import FRAME_RATE, validated
 from .members import RunningTake, Track, filter_take, smooth_take, stack_frames
 from .state_space import Clock, TrackerModel
-from .stream import check_observations, check_times, times_of_each
+from .stream import check_observations, check_recordings, check_times
 
 
 class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """Track a body that is partly hidden, by the mean of its action and the variation of people.
 
     Given the phase p of the action, a pose is ``mean(p) + deviation``, and an observation
-    ``y = H pose + b + noise``.
+    ``y = pose + noise``.
 
     1. The mean is that of the synchronised training trials. Deviations are those from the
        mean of the other groups, so that they are those of a new person.
@@ -64,8 +61,7 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     noise : float or JointNoise, default=0.05
         Standard deviation of observations, in the unit of the features, up to 1e9; the default is
         one of direction cosines. ``JointNoise(0.02, cosines)`` is that of joint positions, 2 cm
-        for metres, which shows more in short limbs; with a ``projection`` it is 0.02 for each
-        number.
+        for metres, which shows more in short limbs.
     frame_rate : float, default=None
         Frames a second of the training trials. Times are then in seconds; without it
         in frames of the training trials.
@@ -232,20 +228,17 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         self,
         X: TrialsLike,
         times: Indexed[ValuesLike] | ValuesLike | None = None,
-        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
     ) -> Any:
         """Track takes: poses and phases at every frame, given the observations up to it.
 
         Parameters
         ----------
-        X : array-like (n_frames, n_observed), DataFrame, or a list or 3-D array of takes
+        X : array-like (n_frames, n_features), DataFrame, or a list or 3-D array of takes
             Observations, NaN where nothing is seen. After a fit on 2-D input the rows of a 2-D
             array are takes.
         times : array-like, shape (n_frames,), or a list of them, default=None
             Times of the frames, increasing: in seconds with a ``frame_rate``, else in frames of
             the training trials. None: one frame of these after the other.
-        projection : array-like (n_observed, n_features) or (matrix, offset), default=None
-            The observation ``matrix @ pose + offset`` of a pose. None: all of it.
 
         Returns
         -------
@@ -255,16 +248,15 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If takes or times break the contract, widths differ from those of ``fit`` or the
-            projection, or anything is infinite.
+            If takes or times break the contract, widths differ from those of ``fit``, or anything
+            is infinite or above 1e9.
         """
-        return self._estimate(filter_take, X, times, projection)
+        return self._estimate(filter_take, X, times)
 
     def smooth(
         self,
         X: TrialsLike,
         times: Indexed[ValuesLike] | ValuesLike | None = None,
-        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
     ) -> Any:
         """Smooth whole takes: poses and phases at every frame, given all observations.
 
@@ -275,12 +267,10 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array-like (n_frames, n_observed), DataFrame, or a list or 3-D array of takes
+        X : array-like (n_frames, n_features), DataFrame, or a list or 3-D array of takes
             Observations, NaN where nothing is seen.
         times : array-like, shape (n_frames,), or a list of them, default=None
             Times of the frames, as for ``track``.
-        projection : array-like (n_observed, n_features) or (matrix, offset), default=None
-            The observation of a pose, as for ``track``.
 
         Returns
         -------
@@ -292,29 +282,22 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         ValueError
             As from ``track``.
         """
-        return self._estimate(smooth_take, X, times, projection)
+        return self._estimate(smooth_take, X, times)
 
     def reset(self) -> None:
         """End the running take: the next observation of ``step`` is the first of another."""
         check_is_fitted(self, "mean_")
         self._running = None
 
-    def step(
-        self,
-        observation: ValuesLike,
-        time: float | None = None,
-        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
-    ) -> Track:
+    def step(self, observation: ValuesLike, time: float | None = None) -> Track:
         """Take the next observation of a running take.
 
         Parameters
         ----------
-        observation : array-like, shape (n_observed,)
+        observation : array-like, shape (n_features,)
             NaN where nothing is seen.
         time : float, default=None
             As for ``track``, later than that of the step before. None: a frame later.
-        projection : array-like (n_observed, n_features) or (matrix, offset), default=None
-            As for ``track``; it may change from step to step.
 
         Returns
         -------
@@ -328,16 +311,14 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
             As from ``track``, or if time does not increase. The take is then as it was before.
         """
         check_is_fitted(self, "mean_")
-        names = names_of_input(self) if projection is None else None
-        observer, offset = self._observer(projection)
-        what = "The observation"
-        values = check_observations(observation, what, names, len(offset))
+        what, width = "The observation", self.mean_.shape[1]
+        values = check_observations(observation, what, names_of_input(self), width)
         last = None if self._running is None else self._running.time
         time = float(check_times(time, 1, self.frame_rate, what, last)[0])
         if self._running is None:
-            self._running = RunningTake(self._model, self._seed, time, len(offset))
+            self._running = RunningTake(self._model, self._seed, time)
         with one_blas_thread():
-            frame = self._running.step(values - offset, time, observer)
+            frame = self._running.step(values, time)
         return Track(*(part[0] for part in stack_frames([frame], self.mean_.dtype)))
 
     def __sklearn_tags__(self):
@@ -345,83 +326,15 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         tags.input_tags.three_d_array = True
         return tags
 
-    def _observer(self, projection):
-        """The `Observer` of a projection, and the offset of what it observes."""
-        model = self._model
-        matrix, offset = check_projection(projection, model.mean.shape[1])
-        if projection is None:
-            return Observer(matrix, model.noise), offset
-        deviation = self.noise.sd if isinstance(self.noise, JointNoise) else self.noise
-        return Observer(matrix, deviation**2 * np.eye(len(matrix))), offset
-
-    def _estimate(self, method, X, times, projection):
+    def _estimate(self, method, X, times):
         check_is_fitted(self, "mean_")
-        names = names_of_input(self) if projection is None else None
-        observer, offset = self._observer(projection)
-        sequences = as_collection(X)
-        single = sequences is None and not self._fitted_on_rows
-        if sequences is None:
-            X = as_pandas(X)
-            sequences = [X] if single else list(as_numbers(X, "X", dtype=np.float64)[..., None])
-        if len(sequences) == 0:
-            raise ValueError("Found 0 takes, at least 1 is needed.")
-        labels = ["The take"]
-        if not single:
-            labels = [name_trial(*pair) for pair in enumerate(labels_of(sequences)[0])]
-        # What a projection shows has units and axes of its own.
-        which = [
-            *(TIMELESS if projection is None else ()),
-            *(["frame_rate"] if times is None else ()),
-        ]
-        if times is None:
-            warn_of_rows(sequences, labels.__getitem__)
-        facts = [facts_of(x) for x in sequences]
-        check_facts(self, facts, labels.__getitem__, reset=False, which=which)
-        times = [times] if single else times_of_each(times, len(sequences))
+        single = as_collection(X) is None and not self._fitted_on_rows
+        if single:
+            X, times = [X], None if times is None else [times]
         tracks = []
-        for what, x, t in zip(labels, sequences, times, strict=True):
-            values = check_observations(x, what, names, len(offset), (2,))
-            t = check_times(t, len(values), self.frame_rate, what)
+        for x, t in zip(*check_recordings(self, X, times, self._fitted_on_rows), strict=True):
             # The matrices are small: several threads would wait for each other.
             with one_blas_thread():
-                frames = method(self._model, self._seed, values - offset, t, observer)
+                frames = method(self._model, self._seed, x, t)
             tracks.append(stack_frames(frames, self.mean_.dtype))
         return tracks[0] if single else tracks
-
-
-# -- the frames of a recording, of which something may be hidden -----------------------------------
-
-
-class Observer(NamedTuple):
-    """An observation ``y = matrix @ pose + noise``: its matrix, and the covariance of the noise."""
-
-    matrix: np.ndarray
-    noise: np.ndarray
-
-    def of(self, chosen):
-        """Of the observed numbers with this mask alone."""
-        return Observer(self.matrix[chosen], self.noise[np.ix_(chosen, chosen)])
-
-
-def check_projection(projection, n_features):
-    """The observation matrix (n_observed, n_features) and its offset (n_observed,), checked.
-
-    A projection is a matrix, the pair of it and the offset, or None, the identity. A ValueError
-    refuses a matrix of another width, what is not finite or above 1e9, and another number of
-    offsets than rows.
-    """
-    if projection is None:
-        return np.eye(n_features), np.zeros(n_features)
-    pair = projection if isinstance(projection, tuple) else (projection,)
-    pair = [as_numbers(part, "The projection", dtype=np.float64) for part in pair]
-    shapes, n = [part.shape for part in pair], len(np.atleast_1d(pair[0]))
-    if n == 0 or shapes not in ([(n, n_features)], [(n, n_features), (n,)]):
-        raise ValueError(
-            f"projection must be a matrix (n_observed, {n_features}), or the pair (matrix, offset) "
-            f"with an offset (n_observed,); got the shapes {shapes}."
-        )
-    matrix, offset = pair if len(pair) == 2 else (pair[0], np.zeros(n))
-    both = np.column_stack([matrix, offset])
-    check_finite(both, "The projection, row")
-    check_magnitude(float(np.abs(both).max()), "The projection", training=False)
-    return matrix, offset

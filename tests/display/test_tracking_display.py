@@ -65,9 +65,9 @@ def test_lost_intervals_and_chosen_features(tracker):
     assert texts(axes[0]) == ["90 %", "estimate", "seen", "lost"]
 
 
-def test_a_single_frame_long_names_and_shared_axes(tracker):
+def test_two_frames_long_names_and_shared_axes(tracker):
     names = [f"the flexion of the right upper extremity {k}" for k in range(X[0].shape[1])]
-    display = TrackingDisplay.from_estimator(tracker, SEEN[:1], names=names)
+    display = TrackingDisplay.from_estimator(tracker, SEEN[:2], names=names)
     label = display.axes_[0].yaxis.label
     display.figure_.draw_without_rendering()
     assert label.get_window_extent().height < display.figure_.bbox.height / 6

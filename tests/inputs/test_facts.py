@@ -148,9 +148,6 @@ def test_the_rate_of_a_parameter_counts_and_times_replace_it():
     fast[1].attrs = {"units": "mm"}
     X[0].attrs["units"] = "m"
     tracker.fit(X)
-    # What a projection shows has a unit of its own.
-    seen = [x.iloc[:, :2] for x in fast]
-    tracker.track(seen, times=[np.arange(0, 30, 2.0)] * 2, projection=np.eye(45)[:2])
     with pytest.raises(ValueError, match="Trial 1 has the unit 'mm'"):
         tracker.track(fast, times=[np.arange(0, 30, 2.0)] * 2)
 

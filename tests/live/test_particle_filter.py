@@ -22,7 +22,6 @@ from sklearn_motionsync.live.state_space import (
     RateProcess,
     TrackerModel,
 )
-from sklearn_motionsync.live.tracker import Observer
 
 RNG, T = np.random.default_rng(0), np.linspace(0, 1, 25)[:, np.newaxis]
 X = np.stack([np.sin(4 * T + RNG.uniform(0, 1, 3)) * RNG.uniform(0.7, 1.3, 3) for _ in range(6)])
@@ -89,44 +88,30 @@ def mean_at(tracker, phases):
     return np.column_stack([np.interp(phases, frames, m) for m in tracker.mean_.T])
 
 
-def posterior(tracker, mean, values, times, matrix, offset, frame, upto):
+def posterior(tracker, mean, values, times, frame, upto):
     """Mean and covariance at a frame, given the observations up to another: one normal."""
     here = ~np.isnan(values[: upto + 1]).ravel()
-    whole = np.kron(np.eye(upto + 1), matrix)[here]
+    whole = np.eye(here.size)[here]
     among = whole @ matern_covariance(tracker, times[: upto + 1], times[: upto + 1]) @ whole.T
     among += tracker.noise**2 * np.eye(len(whole))
     across = matern_covariance(tracker, times[[frame]], times[: upto + 1]) @ whole.T
-    expected = (mean[: upto + 1] @ matrix.T + offset).ravel()[here]
-    off = values[: upto + 1].ravel()[here] - expected
+    off = (values[: upto + 1] - mean[: upto + 1]).ravel()[here]
     gain = across @ np.linalg.inv(among)
     return mean[frame] + gain @ off, tracker.covariance_ - gain @ across.T
 
 
-def assert_posterior(tracker, track, method, mean, values, times, projection=None, frames=None):
+def assert_posterior(tracker, track, method, mean, values, times, frames=None):
     """A track has the mean and the covariance of the posterior at these frames, or at all."""
-    matrix, offset = (np.eye(3), np.zeros(3)) if projection is None else projection
     for i in range(len(times)) if frames is None else frames:
         upto = i if method == "track" else len(times) - 1
-        expected, covariance = posterior(tracker, mean, values, times, matrix, offset, i, upto)
+        expected, covariance = posterior(tracker, mean, values, times, i, upto)
         np.testing.assert_allclose(track.poses[i], expected, rtol=0, atol=1e-9)
         np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
 
 
-PROJECTION = np.array([[1.0, 0.2, 0.0], [0.0, -1.0, 0.5]]), np.array([0.3, -1.0])
-
-
-def seen_through(values, projection):
-    """Observations with gaps, as they are or through a projection."""
-    matrix, offset = (np.eye(3), np.zeros(3)) if projection is None else projection
-    return with_gaps(values @ matrix.T + offset)
-
-
 @pytest.mark.parametrize("member", ["phases", "pooled"])
-@pytest.mark.parametrize("projection", [None, PROJECTION])
 @pytest.mark.parametrize("method", ["track", "smooth"])
-def test_poses_equal_gaussian_process_posterior(
-    fitted, model, seen, method, projection, member, monkeypatch
-):
+def test_poses_equal_gaussian_process_posterior(fitted, model, seen, method, member, monkeypatch):
     """That of the pooled member about the mean of all frames, whatever the phase."""
     body, level = fitted, fitted.mean_.mean(axis=0)
     if member == "pooled":
@@ -140,14 +125,14 @@ def test_poses_equal_gaussian_process_posterior(
         body = SimpleNamespace(
             length_scale_=length_scale, covariance_=pooled.covariance, noise=fitted.noise
         )
-    values, times = seen_through(seen[0], projection), seen[1]
-    track = getattr(fitted, method)(values, times=times, projection=projection)
+    values, times = with_gaps(seen[0]), seen[1]
+    track = getattr(fitted, method)(values, times=times)
     assert track.phases[-1] < fitted.n_frames_ - 1
     assert not track.lost.any()
     mean = mean_at(fitted, track.phases)
     if member == "pooled":
         mean = np.tile(level, (len(times), 1))
-    assert_posterior(body, track, method, mean, values, times, projection)
+    assert_posterior(body, track, method, mean, values, times)
 
 
 @pytest.mark.parametrize("method", ["track", "smooth"])
@@ -195,7 +180,7 @@ def test_first_frame_unseen_is_the_mixture_of_first_phases(method):
     """Of 20 particles two begin elsewhere, evenly spread; each is on a path of the smoother."""
     tracker = MotionTracker(LinearSynchronizer(), 20, noise=0.1).fit(X)
     last, mean = tracker.n_frames_ - 1, tracker.mean_
-    track = getattr(tracker, method)(np.full((1, 3), np.nan))
+    track = getattr(tracker, method)(np.full((2, 3), np.nan))
     phases = np.append(np.zeros(18), [9 / 19 * last, last])
     poses = np.column_stack([np.interp(phases, np.arange(last + 1), m) for m in mean.T])
     np.testing.assert_allclose(track.poses[0], poses.mean(axis=0), atol=1e-12)
@@ -257,9 +242,9 @@ def test_limits_of_the_nis_equal_their_definition(outlier, duration):
 
 def test_estimates_are_those_of_the_weighted_particles():
     """Law of total variance, weighted medians, effective size; and of rates at the end, 0."""
-    running, mean = RunningTake(of_uneven_rates(24.0), 3, 0.0, 3), X.mean(axis=0)
+    running, mean = RunningTake(of_uneven_rates(24.0), 3, 0.0), X.mean(axis=0)
     for p in range(25):
-        track = running.step(X[2, p], float(p), Observer(np.eye(3), NOISE))
+        track = running.step(X[2, p], float(p))
         particles, deviations = running.phases.particles, running.phases.deviations
         weights = np.exp(particles.log_weights)
         assert weights.sum() == pytest.approx(1)
@@ -298,40 +283,39 @@ def test_pool_multiplies_densities_by_their_weights(model):
 def test_evidence_is_the_average_nis_of_innovations(model, seen):
     """Of both members, by their distribution before each observation."""
     values, times = seen
-    rows = np.eye(3)
-    running = RunningTake(model, 1, times[0], 3)
+    running = RunningTake(model, 1, times[0])
     evidence, before = np.ones(2), times[0]
     for y, time in zip(values, times, strict=True):
         running.phases.rng, again = np.random.default_rng(0), np.random.default_rng(0)
         other = deepcopy(running)
         other.phases.rng = again
-        other.update(np.full(3, np.nan), time, Observer(rows, NOISE))
+        other.update(np.full(3, np.nan), time)
         left = np.exp(-(time - before) / model.clock.memory)
         for k, member in enumerate((other.phases, other.pooled)):
             mean, covariance = member.estimate
             off = y - mean
             nis = off @ np.linalg.solve(covariance + NOISE, off) / 3
             evidence[k] = left * evidence[k] + (1 - left) * nis
-        running.update(y, time, Observer(rows, NOISE))
+        running.update(y, time)
         np.testing.assert_allclose(running.evidence, evidence, rtol=1e-6)
         before = time
     assert (evidence != 1).all()
 
 
-@pytest.mark.parametrize("rows", [[0, 2], [0, 1, 2], [0, 1, 2, 0, 1]])
+@pytest.mark.parametrize("rows", [[0, 2], [0, 1, 2]])
 def test_weights_and_nis_equal_their_definitions(rows):
     """By the slopes of the particles; a NIS of few numbers varies as that of all features."""
     model, matrix = of_uneven_rates(48.0), np.eye(3)[rows]
-    running, all_seen = ParticleFilter(model, 3, 0.0, len(rows)), np.ones(len(rows), dtype=bool)
+    running, seen = ParticleFilter(model, 3, 0.0), np.isin(np.arange(3), rows)
     nis, n, share = np.ones(2), len(rows), min(np.sqrt(len(rows) / 3), 1)
     noise, frames = 0.01 * np.eye(n), np.arange(25)
     for p in range(25):
         before, dt = running.particles, 2.0 if p else 0.0
         y = matrix @ X[2, p] + 0.02 * np.cos(np.arange(n) + p)
-        running.update(y, 2.0 * p, Observer(matrix, noise))
+        running.update(np.where(seen, matrix.T @ y, np.nan), 2.0 * p)
         now = running.particles
         if p:
-            slopes, variances = running.slopes.fit(all_seen)
+            slopes, variances = running.slopes.fit(seen)
             known = matrix @ model.velocities @ matrix.T + 0.01 * np.diag(variances)
             distances = np.einsum("ni,ij,nj->n", slopes, np.linalg.inv(known), slopes)
             old = before.weights if before.effective_size >= 30 else np.full(60, 1 / 60)

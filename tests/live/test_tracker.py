@@ -59,9 +59,8 @@ def test_facts_of_takes_are_compared_where_they_matter():
     fitted = MotionTracker(LinearSynchronizer(), 30, noise=0.02).fit(tables(TRAINING, **facts))
     (fast,) = tables([movement(1.0, 120)], **facts | {"frame_rate": 100})
     (turned,) = tables([movement(1.0)], **facts | {"units": "mm", "up": "z"})
-    # With times the frame rate does not matter, with a projection neither do unit and axis.
+    # With times the frame rate does not matter.
     assert len(fitted.track(fast, times=np.arange(120) / 2).phases) == 120
-    assert len(fitted.track(turned, projection=np.eye(3)).phases) == 60
     with pytest.warns(UserWarning, match="100 frames a second"):
         fitted.track(fast)
     with pytest.raises(ValueError, match="mm"):
@@ -108,18 +107,6 @@ def test_rows_are_takes_after_a_fit_on_rows(tracker):
     tracks = fitted.track(rows[:2])
     assert [t.poses.shape for t in tracks] == [(60, 1)] * 2
     assert_same(fitted.step(rows[0, 0]), (part[0] for part in tracks[0]))
-
-
-def test_projection_of_poses(tracker, running):
-    """It may be the identity, and may change from step to step."""
-    matrix, offset, clean = np.eye(2, 3), np.array([3.0, -2.0]), movement(1.05)
-    for identity in (np.eye(3), (np.eye(3),), (np.eye(3), np.zeros(3))):
-        assert_same(tracker.track(clean, projection=identity), tracker.track(clean))
-    image = clean @ matrix.T + offset
-    track = tracker.track(image, projection=(matrix, offset))
-    for k, frame in enumerate(image[:5]):
-        assert_same(running.step(frame, projection=(matrix, offset)), (part[k] for part in track))
-    assert np.isfinite(running.step(clean[5]).poses).all()
 
 
 # -- what is learnt -----------------------------------------------------------------------
@@ -190,7 +177,7 @@ def test_smoothed_phases_of_hidden_frames_are_those_that_lead_to_the_later_ones(
     assert np.median(track.rates[20:35]) == pytest.approx(59 / 39, rel=0.2)
 
 
-@pytest.mark.parametrize("size", [50.0, 1e30, 1.7e308])
+@pytest.mark.parametrize("size", [50.0, 1e9])
 def test_observations_outside_the_gate_are_ignored_then_lost(tracker, size):
     clean = movement(1.05)
     odd, without = clean.copy(), clean.copy()
@@ -242,21 +229,16 @@ INFINITE = np.where(np.arange(180).reshape(60, 3) == 11, np.inf, movement(1))
 @pytest.mark.parametrize(
     ("X", "more", "message"),
     [
-        (movement(1)[:, :2], {}, r"The take has shape \(60, 2\), expected \(n, 3\)"),
-        ([movement(1), movement(1)[:, :2]], {}, r"Trial 1 has shape \(60, 2\)"),
-        (INFINITE, {}, r"The take, frame 3, feature 2 is infinity"),
-        (movement(1)[:0], {}, r"with n at least 1"),
-        (movement(1)[0], {}, r"x\[:, np.newaxis\]"),
-        ([], {}, "0 takes"),
-        (movement(1), {"times": np.r_[0:30, 20:50]}, r"The take: time stamps must increase"),
+        (movement(1)[:, :2], {}, "Trial 0 has 2 features a frame"),
+        ([movement(1), movement(1)[:, :2]], {}, "Trial 1 has 2 features"),
+        (INFINITE, {}, "Trial 0, frame 3, feature 2 is infinity"),
+        (1e10 * movement(1), {}, "Trial 0 .*1e\\+09"),
+        (movement(1)[:1], {}, "with at least 2 frames"),
+        (movement(1)[0], {}, r"wrap one sequence as \[X\]"),
+        ([], {}, "0 trials"),
+        (movement(1), {"times": np.r_[0:30, 20:50]}, "Trial 0: time stamps must increase"),
         ([movement(1)], {"times": [None, None]}, "for each trial, got 2 for 1"),
         ([movement(1)], {"times": 3.0}, "for each trial, got none for 1"),
-        (movement(1), {"projection": (np.eye(3),) * 3}, r"or the pair \(matrix, offset\)"),
-        (movement(1), {"projection": np.eye(2)}, r"matrix \(n_observed, 3\)"),
-        (movement(1), {"projection": (np.eye(3), [1.0])}, r"an offset \(n_observed,\)"),
-        (movement(1), {"projection": np.full((1, 3), np.nan)}, "is NaN"),
-        (movement(1), {"projection": [np.eye(3), np.zeros(3)]}, "The projection is not a numeric"),
-        (movement(1), {"projection": 1e12 * np.eye(3)}, r"The projection holds .* 1e\+12"),
         (movement(1), {"times": 1e-12 * np.arange(60)}, r"by 1e-09 to 1e\+09 frames"),
         (movement(1)[:2], {"times": [0, 1e200]}, r"but 1e\+200 follows 0"),
     ],
@@ -296,9 +278,11 @@ def test_refused_estimators(tracker):
 def test_feature_names_are_checked():
     frames = [pd.DataFrame(movement(s), columns=list("xyz")) for s in (0.9, 1.0, 1.1)]
     named = MotionTracker(LinearSynchronizer(), 20).fit(frames)
-    assert_same(named.track(frames[0]), named.track(frames[0].to_numpy()))
-    with pytest.raises(ValueError, match="should match"):
-        named.track(frames[0][list("zyx")])
+    with pytest.warns(UserWarning, match="does not have valid feature names"):
+        assert_same(named.track(frames[0]), named.track(frames[0].to_numpy()))
+    assert_same(named.track(frames[0]), named.track(frames[0][list("zyx")]))
+    with pytest.raises(ValueError, match="hip"):
+        named.track(frames[0].rename(columns={"x": "hip"}))
     with pytest.raises(ValueError, match="should match"):
         named.step(frames[0][list("zyx")].iloc[0])
 
