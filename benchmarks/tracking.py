@@ -87,8 +87,7 @@ class Fold:
         self.cosines = DirectionCosines(skeleton, hidden="nan").fit(self.train)
         self.poses = self.cosines.transform(self.train)
         self.groups = actors[actors != held]
-        columns = self.cosines.position_matrix()[1]
-        self.joints = [column[:-2] for column in columns[::3]]
+        self.joints = list(self.cosines.skeleton.body().joints)
         self.trackers = {sd: self.tracker(sd) for sd in (SMALL, LARGE)}
         self.covariances = {sd: self.covariance(sd) for sd in (SMALL, LARGE)}
 
@@ -125,12 +124,14 @@ class Fold:
         return self.cosines.transform([moved])[0], counts | (kind == "moved")
 
     def place(self, poses, x):
-        """Joints (n_frames, n_joints, 3) of poses of a person with limbs of unit directions."""
-        matrix, _ = DirectionCosines(self.skeleton).fit([x]).position_matrix()
-        limbs = poses[:, 1:].reshape(len(poses), -1, 3)
-        limbs = limbs / np.linalg.norm(limbs, axis=2, keepdims=True)
-        whole = np.column_stack([poses[:, 0], limbs.reshape(len(limbs), -1)])
-        return (whole @ matrix.T).reshape(len(whole), -1, 3)
+        """Joints (n_frames, n_joints, 3) of poses of a person, the hips beside the pelvis."""
+        points = DirectionCosines(self.skeleton).fit([x]).inverse_transform([poses])[0]
+        points, at = points.reshape(len(poses), -1, 3), self.joints.index
+        hips = points[:, [at("left_hip"), at("right_hip")], 1].mean(axis=1)
+        # Legs were moved onto the floor.
+        legs = [k for k, name in enumerate(self.joints) if name.endswith(("hip", "knee", "ankle"))]
+        points[:, legs, 1] -= (hips - points[:, at("pelvis"), 1])[:, np.newaxis]
+        return points
 
     def error(self, poses, x, counts):
         """Of joints, in cm."""

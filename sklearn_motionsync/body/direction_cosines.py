@@ -181,59 +181,6 @@ class DirectionCosines(PositionsTransformer):
         arrays = [self._positions(trials, i) for i in range(len(trials))]
         return restore(self, trials, arrays, columns=self.skeleton.body().column_names)
 
-    def position_matrix(self) -> tuple[np.ndarray, list[str]]:
-        """The matrix of the linear map from poses to joint positions.
-
-        The pelvis is at its height above the origin, and each joint at the end of its limb. That
-        equals ``inverse_transform`` of cosines of length 1, except for its last step: there the
-        hips of a trial, and the legs with them, are shifted by one height that puts the
-        lowest ankle on the floor.
-
-        The rows of x and y are an orthographic picture from the front. A `MotionTracker` that
-        observes positions takes such rows as its projection, and that height of the legs as its
-        offset, 0 for other joints.
-
-        Returns
-        -------
-        matrix : ndarray of float64, shape (n_dims * n_joints, n_features)
-            ``poses @ matrix.T`` are positions of the joints of ``skeleton.body()``, y up, of a
-            body that faces along z; with ``reference="world"`` along the recording's axes.
-        names : list of str
-            Names of its rows, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ...
-
-        Raises
-        ------
-        ValueError
-            If ``reference="parent"``, whose axes turn with the pose: that is not linear.
-
-        Examples
-        --------
-        >>> from sklearn_motionsync import DirectionCosines
-        >>> from sklearn_motionsync.datasets import make_bending
-        >>> bunch = make_bending(2, random_state=0)
-        >>> cosines = DirectionCosines(bunch.skeleton).fit(bunch.data)
-        >>> matrix, names = cosines.position_matrix()
-        >>> matrix.shape, names[:3]
-        ((45, 37), ['pelvis_x', 'pelvis_y', 'pelvis_z'])
-
-        A picture from the front, in which the left arm is hidden:
-
-        >>> hidden = ("left_elbow", "left_wrist")
-        >>> seen = [name[-1] in "xy" and not name.startswith(hidden) for name in names]
-        >>> picture = cosines.transform(bunch.data)[0] @ matrix[seen].T
-        >>> picture.shape[1]
-        26
-        """
-        check_is_fitted(self, "limb_lengths_")
-        if self.reference == "parent":
-            raise ValueError(
-                "Positions are not linear in cosines along parent limbs, which turn with the "
-                "pose. Use reference='heading' or 'world', or inverse_transform."
-            )
-        lengths = self._all_lengths(self.limb_lengths_.astype(np.float64))
-        matrix = _forward_matrix(lengths, self.skeleton)
-        return matrix, self.skeleton.body().column_names
-
     @property
     def _names(self):
         return cosine_names(self.skeleton.limbs, self.skeleton.n_dims, self.skeleton.has_height)
@@ -310,16 +257,6 @@ def _forward_kinematics(heights, cosines, lengths, skeleton):
             for joint in ("hip", "knee", "ankle"):
                 at[f"{side}_{joint}"][:, 1] -= shift
     return _joined(at, skeleton)
-
-
-def _forward_matrix(lengths, skeleton):
-    """The matrix (n_dims * n_landmarks, n_features) of the forward kinematics without the shift."""
-    first, n_dims, limbs = int(skeleton.has_height), skeleton.n_dims, skeleton.limbs
-    basis = np.eye(first + n_dims * len(limbs))
-    cosines = np.zeros((len(basis), len(LIMBS), n_dims))
-    cosines[:, limb_indices(limbs)] = basis[:, first:].reshape(len(basis), -1, n_dims)
-    heights = basis[:, 0] if first else None
-    return _joined(_landmarks_of(heights, cosines, lengths, limbs), skeleton).T
 
 
 def _landmarks_of(heights, cosines, lengths, limbs):

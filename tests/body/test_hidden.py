@@ -333,30 +333,6 @@ def test_inverse_transform_hides_joints_below_a_hidden_limb(reference, recording
     np.testing.assert_array_equal(back, np.where(expected[..., np.newaxis], np.nan, whole))
 
 
-# -- position_matrix ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("reference", ["heading", "world"])
-@pytest.mark.parametrize("n_dims", [2, 3])
-def test_position_matrix_equals_inverse_transform_but_for_the_shift(reference, n_dims, recordings):
-    x = recordings[0].reshape(-1, 15, 3)[..., :n_dims].reshape(len(recordings[0]), -1)
-    cosines = DirectionCosines(Skeleton.paper(n_dims=n_dims), reference).fit(x)
-    poses = cosines.transform(x)
-    matrix, names = cosines.position_matrix()
-    assert matrix.shape == (15 * n_dims, 1 + 12 * n_dims)
-    assert names == cosines.skeleton.column_names
-    off = cosines.inverse_transform(poses) - poses @ matrix.T
-    moves = np.array([name.endswith(("hip_y", "knee_y", "ankle_y")) for name in names])
-    np.testing.assert_allclose(off[:, ~moves], 0, atol=1e-12)
-    np.testing.assert_allclose(off[:, moves], off[0, moves][0], atol=1e-12)
-    # A body that stands straight, the hips beside the pelvis, is not shifted.
-    upright = cosines.fit_transform(standing().reshape(-1, 3)[:, :n_dims].reshape(1, -1))
-    found = upright @ cosines.position_matrix()[0].T
-    np.testing.assert_allclose(found, cosines.inverse_transform(upright), atol=1e-12)
-    with pytest.raises(ValueError, match="not linear in cosines along parent limbs"):
-        DirectionCosines(cosines.skeleton, "parent").fit(x).position_matrix()
-
-
 # -- real people --------------------------------------------------------------------------
 
 
