@@ -1,6 +1,5 @@
 """The members of a tracker, with and without a phase, their pool, and its smoother."""
 
-from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -236,8 +235,6 @@ def _smooth_frame(model, past, path, evidence, on_paths, without):
 _N_PATHS = 20
 # Standard deviation of the phases of a path about those of the particles, in frames of the clock.
 _PHASE_SPREAD = 0.5
-# Frames whose filtered states are in memory at once.
-_BLOCK = 100
 
 
 class HistoryFrame(NamedTuple):
@@ -295,37 +292,11 @@ def smooth_deviations(process, frames, noise):
     """Poses of several hypotheses given all observations, and their common covariance.
 
     Of each `PathFrame` there are the poses (n_paths, n_features), and the covariance. That is the
-    modified Bryson-Frazier smoother, which inverts the innovation covariance only. The Kalman
-    filter runs twice, first for the states at the beginning of each block of frames.
+    modified Bryson-Frazier smoother, which inverts the innovation covariance only.
     """
-    blocks = [slice(i, i + _BLOCK) for i in range(0, len(frames), _BLOCK)]
-    states = [DeviationFilter(process, len(frames[0].expected))]
-    for block in blocks[:-1]:
-        states.append(_filter_block(frames[block], noise, states[-1])[1])
-    out, later = [], None
-    for block, state in zip(blocks[::-1], states[::-1], strict=True):
-        filtered, _ = _filter_block(frames[block], noise, state)
-        for frame, (poses, columns, update) in reversed(
-            list(zip(frames[block], filtered, strict=True))
-        ):
-            covariance = columns[: columns.shape[1]]
-            if later is not None:
-                adjoint, information = later
-                poses = poses - adjoint @ columns
-                covariance = covariance - columns.T @ information @ columns
-            out.append((poses, covariance))
-            later = _adjoint_step(process, frame, update, later)
-    return out[::-1]
-
-
-def _filter_block(frames, noise, state):
-    """The Kalman filter on from a state, a `DeviationFilter` that stays as it is.
-
-    Returns a list of filtered frames, and the state after them. A filtered frame has the poses
-    (n_paths, n_features), the columns of the state covariance that belong to the values,
-    (2 n_features, n_features), and the `KalmanUpdate`, None without observations.
-    """
-    running, filtered = copy(state), []
+    # Of each frame the poses, the columns of the state covariance that belong to the values,
+    # (2 n_features, n_features), and the `KalmanUpdate`, None without observations.
+    running, filtered = DeviationFilter(process, len(frames[0].expected)), []
     for frame in frames:
         if frame.initial:
             running.begin(len(frame.expected))
@@ -336,10 +307,18 @@ def _filter_block(frames, noise, state):
         update, seen = None, ~np.isnan(frame.values)
         if seen.any():
             update = running.correct((frame.values - frame.expected)[:, seen], seen, noise)
-        width = frame.expected.shape[1]
-        columns = running.covariance[:, :width].copy()
+        columns = running.covariance[:, : len(seen)].copy()
         filtered.append((frame.expected + running.means[0], columns, update))
-    return filtered, running
+    out, later = [], None
+    for frame, (poses, columns, update) in zip(frames[::-1], filtered[::-1], strict=True):
+        covariance = columns[: columns.shape[1]]
+        if later is not None:
+            adjoint, information = later
+            poses = poses - adjoint @ columns
+            covariance = covariance - columns.T @ information @ columns
+        out.append((poses, covariance))
+        later = _adjoint_step(process, frame, update, later)
+    return out[::-1]
 
 
 def _adjoint_step(process, frame, update, later):

@@ -262,7 +262,7 @@ class MotionTracker(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
 
         20 paths of phases are drawn by forward filtering and backward simulation, and a
         Rauch-Tung-Striebel smoother in the form of Bryson and Frazier estimates the deviations
-        along each, and those of the filter that knows no phase. It needs about 0.06 MB a frame of
+        along each, and those of the filter that knows no phase. It needs about 0.1 MB a frame of
         37 features.
 
         Parameters
