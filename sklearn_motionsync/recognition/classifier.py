@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from numbers import Integral, Real
 from typing import Literal, Self
 
@@ -217,8 +216,7 @@ class ActionClassifier(LongWorkMixin, SequenceLevelMixin, ClassifierMixin, BaseE
         Returns
         -------
         ndarray, shape (n_sequences,)
-            Classes, and "unknown", -1 or NaT for those that ``reject_below`` rejects. If it is not
-            None, the dtype holds both: with classes of 8 bits without sign, and -1, it is int64.
+            Classes, and "unknown", -1 or NaT for those that ``reject_below`` rejects.
         """
         decisions = self._decisions(X)
         codes = first_largest(decisions, axis=1)
@@ -239,13 +237,9 @@ class ActionClassifier(LongWorkMixin, SequenceLevelMixin, ClassifierMixin, BaseE
             )
         if kind in "UO":
             return np.append(self.classes_, label)[codes]
-        # The first type of number that holds all labels.
-        for dtype in (self.classes_.dtype, np.int64, np.float64):
-            with suppress(OverflowError):
-                held = np.array([*labels, label], dtype)
-                if held.tolist() == [*labels, label]:
-                    return held[codes]
-        return np.array([*labels, label], dtype=object)[codes]
+        numbers = np.array([*labels, label])
+        is_exact = numbers.tolist() == [*labels, label]
+        return numbers[codes] if is_exact else np.array([*labels, label], dtype=object)[codes]
 
     def score(self, X: TrialsLike, y: Labels, sample_weight: ValuesLike | None = None) -> float:
         """Share of trials that are given their class.
