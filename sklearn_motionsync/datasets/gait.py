@@ -55,9 +55,8 @@ _WAVE, _WAVE_WITHIN = 1.5, 0.3
 _RANGE, _FORCE_PER_DEGREE = 0.06, 0.02
 # Noise of the force in body weights, as a share of that of the angles in degrees.
 _FORCE_NOISE = 0.01
-# The number of moments of the pace of a person, and of the times of the groups.
+# The number of moments of the pace of a person.
 _N_PACE = 501
-_N_MOMENTS = 101
 
 
 @validated_function(
@@ -147,8 +146,6 @@ def make_gait(
             Their units: degrees, and body weights.
         frame_rate : float
             Frames per second, as given.
-        group_times : ndarray (2, 101)
-            The share of the cycle that is over at 101 even moments of ``times`` in each group.
 
     Raises
     ------
@@ -165,9 +162,6 @@ def make_gait(
     >>> bunch = make_gait(4, n_cycles=2, timing=3, random_state=0)
     >>> len(bunch.data), bunch.feature_names
     (8, ['hip_flexion', 'knee_flexion', 'ankle_dorsiflexion', 'vertical_force'])
-    >>> later = 100 * (bunch.group_times[1] - bunch.group_times[0])
-    >>> later[[0, 30, 62, 100]].round(1).tolist()  # in per cent of the cycle
-    [0.0, 0.8, 3.0, 0.0]
     """
     # The same people walk, in cycles and in takes.
     seeds = check_random_state(random_state).randint(np.iinfo(np.int32).max, size=n_people)
@@ -179,11 +173,9 @@ def make_gait(
         recorded.append(record(generator, walk, n_frames, noise))
     gait = _describe_takes(recorded, frame_rate) if takes else _describe_cycles(recorded)
     people = np.arange(n_people).repeat(len(gait.data) // n_people)
-    moments = np.linspace(0, 1, _N_MOMENTS)
     gait.update(
         person=np.array([f"person{i}" for i in people]),
         group=np.array([_GROUPS[i % 2] for i in people]),
-        group_times=np.stack([_shift_times(moments, t) for t in (0.0, timing)]),
         feature_names=list(_CURVES),
         units=list(_UNITS),
         frame_rate=float(frame_rate),
