@@ -14,9 +14,8 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.collections import as_collection
+from ..inputs.collections import as_collection, check_members
 from ..inputs.facts import facts_in_fit, facts_of
-from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import SAME_RATE
 from ..inputs.resampling import as_frame_rates
 from ..inputs.tables import as_pandas
@@ -318,7 +317,7 @@ def _reach(pattern, X, groups):
         if groups is not None:
             raise ValueError("groups are those of training trials; an array has none.")
         pattern = _check_pattern(pattern)
-        synchronizer = DenseSynchronizer(min(len(pattern), _CLOCK), pattern=0).fit([pattern])
+        synchronizer = DenseSynchronizer(min(len(pattern[0]), _CLOCK), pattern=0).fit(pattern)
         return synchronizer, synchronizer.check_trials(X), None
     _, synchronizer = find_synchronizer(pattern)
     check_is_fitted(synchronizer)
@@ -332,23 +331,16 @@ def _reach(pattern, X, groups):
 
 
 def _check_pattern(pattern):
-    """One trial: a DataFrame, or an array (n_frames, n_features)."""
-    pattern = as_pandas(pattern)
-    is_array = isinstance(pattern, (list, tuple, np.ndarray, pd.DataFrame))
-    if is_array and as_collection(pattern) is not None:
+    """One trial, a DataFrame or an array (n_frames, n_features), as a collection of one."""
+    pattern = as_takes(pattern, univariate=True)
+    trials = check_members(as_collection(pattern))
+    if len(trials) > 1 or len(trials[0]) < _SHORTEST:
         raise ValueError(
-            "The pattern is a collection of trials: give one of them, (n_frames, "
-            "n_features), or fit a synchronizer to all, and give that."
+            f"The pattern has {counted(len(trials), 'trial')}, the first of {len(trials[0])} "
+            f"frames: give one trial, (n_frames, n_features), of at least {_SHORTEST} frames, or "
+            "a synchronizer that was fitted to several."
         )
-    array = as_numbers(pattern, "The pattern")
-    array = array[:, np.newaxis] if array.ndim == 1 else array
-    if array.ndim != 2 or len(array) < _SHORTEST:
-        raise ValueError(
-            f"The pattern has shape {array.shape}: give one trial, (n_frames, "
-            f"n_features), of at least {_SHORTEST} frames, or a fitted synchronizer."
-        )
-    check_finite(array, "The pattern, frame")
-    return pattern if isinstance(pattern, pd.DataFrame) else array
+    return pattern
 
 
 def _training_groups(pattern, reached, groups):
