@@ -308,9 +308,6 @@ _LEAST_PROPOSED = 1.5
 _NEAR_END = 0.5
 # Proposals of a part of a take that are tried; those of about the same lag and place are one.
 _TRIES, _SAME_LAG, _SAME_PLACE = 6, 1.25, 0.5
-# Stretches of a slowly changing pace are one: their periods differ up to the first ratio, and
-# between them are so many periods.
-_SAME_PACE, _BETWEEN = 1.3, 0.25
 # What a strength counts at most, where other movements could have repeated by chance.
 _HIGHEST = 0.98
 
@@ -354,7 +351,7 @@ def find_repeats(x, threshold, limits=None):
     if not stretches:
         correlation = correlate(x, limits)
         return Repeats([], correlation, rejection_reason(correlation, threshold) or "not cyclic")
-    return summary_of(_join(take, sorted(stretches, key=lambda s: s.start), threshold))
+    return summary_of(sorted(stretches, key=lambda stretch: stretch.start))
 
 
 def summary_of(stretches):
@@ -362,30 +359,6 @@ def summary_of(stretches):
     longest = max(stretches, key=lambda stretch: stretch.stop - stretch.start)
     n_cycles = sum(stretch.correlation.n_cycles for stretch in stretches)
     return Repeats(stretches, longest.correlation._replace(n_cycles=n_cycles), "")
-
-
-def _join(take, stretches, threshold):
-    """Neighbours of nearly the same period as one stretch."""
-    joined = stretches[:1]
-    for stretch in stretches[1:]:
-        before, (a, b) = joined[-1], (joined[-1].correlation, stretch.correlation)
-        near = stretch.start - before.stop <= whole(_BETWEEN * min(a.period, b.period), "down")
-        if near and _ratio(a.period, b.period) <= _SAME_PACE:
-            start, stop = before.start, stretch.stop
-            correlation = correlate(take.x[start:stop], take.limits)
-            if (
-                rejection_reason(correlation, threshold)
-                or _ratio(correlation.period, a.period) > _SAME_PACE
-            ):
-                # The pace changes too much for a single period.
-                longer = max(before, stretch, key=lambda one: one.stop - one.start).correlation
-                n_cycles = a.n_cycles + b.n_cycles
-                period = (stop - start) / n_cycles
-                correlation = longer._replace(period=period, n_cycles=n_cycles)
-            joined[-1] = Repetition(start, stop, correlation)
-        else:
-            joined.append(stretch)
-    return joined
 
 
 def _find_first(take, part, threshold):

@@ -102,7 +102,12 @@ def test_ends_are_those_of_the_take_if_little_is_left():
 def test_a_changing_pace_is_one_stretch_and_two_movements_are_two():
     t = np.linspace(0, 1, 1000)
     angle = 2 * np.pi * 12 * (t + 0.05 * np.sin(np.pi * t))[:, np.newaxis]
-    assert places(np.sin(angle + np.arange(3)) + 0.5 * np.cos(2 * angle)) == [(0, 1000)]
+    x = np.sin(angle + np.arange(3)) + 0.5 * np.cos(2 * angle)
+    # A fit follows the pattern at any pace; of the self-correlation alone it may be several.
+    (row,) = CycleSegmenter(start=0).fit([x]).report([x]).itertuples()
+    assert row.stretches == [(0, 1000)]
+    for cycles in (row.n_cycles, CycleSegmenter().report([x])["n_cycles"][0]):
+        assert cycles == pytest.approx(12, abs=0.2)
     quick = np.concatenate([waves(300, 60), waves(300, 25)])
     ends = places(quick)
     assert len(ends) == 2
