@@ -1,6 +1,5 @@
 """Landmarks guessed from the names of joints: those of a known format, or by parts of names."""
 
-import difflib
 import functools
 import os
 import re
@@ -129,22 +128,6 @@ def missing_counterparts(landmarks, named):
         and (other := other_side(name)) in landmarks
         and other not in named
     ]
-
-
-def nearest_names(missing, landmarks, joints):
-    """For missing landmarks the free joints whose names are nearest to what they could be."""
-    held = {joint for at in landmarks.values() for joint in as_tuple(at)}
-    pairs = [pair for pair in _without_prefix(list(joints)) if pair[1] not in held]
-    free, nearest = {_plain(name): joint for name, joint in pairs}, {}
-    for landmark in missing:
-        side, _, part = landmark.rpartition("_")
-        words = list(map(_plain, as_tuple(landmarks.get(landmark, ()))))
-        for word in re.findall("[a-z]+", _JOINTS[part]):
-            words.append((side if len(word) > 4 else side[:1]) + word)
-        matches = (difflib.get_close_matches(word, free, 1, 0.75) for word in words)
-        if match := next(filter(None, matches), None):
-            nearest[landmark] = free[match[0]]
-    return nearest
 
 
 def other_side(landmark):

@@ -22,7 +22,6 @@ from .landmarks import (
     as_tuple,
     guess_landmarks,
     missing_counterparts,
-    nearest_names,
 )
 from .limbs import (
     LIMBS,
@@ -544,13 +543,11 @@ def _check_landmarks(landmarks, named, joints):
         missing = [name for name in LANDMARKS if name not in there]
     if missing:
         got = f" (got { ({name: there[name] for name in absent}) })" if absent else ""
-        nearest = nearest_names(missing, there, joints)
-        nearest = f" The nearest names give landmarks={nearest}." if nearest else ""
         raise ValueError(
             f"No joint stands for the landmarks {missing}{got}; give landmarks={{...}} with one of "
             f"the joints {list(joints)} for each, or several of them for their mean, such as "
             "{'pelvis': ('LASI', 'RASI')}. A landmark that the body lacks is None; both ends "
-            f"of one limb must be there.{nearest}"
+            "of one limb must be there."
         )
     return MappingProxyType(there)
 

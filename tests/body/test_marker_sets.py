@@ -121,13 +121,6 @@ def test_a_person_is_found_beside_an_object_and_two_people_are_refused():
         Skeleton([*person, *(f"Bob:{name}" for name in legs)], [-1] * 12)
 
 
-def test_missing_landmarks_are_named_with_the_nearest_guess():
-    names = ["LASI", "RASI", "RKNE", "RANK", "LKNEX", "LANKX"]
-    message = r"landmarks=\{'left_knee': 'LKNEX', 'left_ankle': 'LANKX'\}"
-    with pytest.raises(ValueError, match=message):
-        Skeleton(names, [-1] * 6)
-
-
 def test_sides_that_positions_contradict_are_warned_of():
     bends = make_bending(1, random_state=0)
     df, knees = pd.DataFrame(), []
