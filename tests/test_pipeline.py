@@ -118,7 +118,7 @@ def test_displays_and_scorers_take_key_frames(nested, routing, marked, points):
         match = Match.from_estimator(pipe, FEW.data, keyframes=K)
         display = SynchronizationDisplay.from_estimator(pipe, FEW.data, keyframes=K, features=0)
         model = ActionModelDisplay.from_estimator(pipe, FEW.data, keyframes=K, features=0)
-        people = SkeletonDisplay.from_estimator(pipe, FEW.data, keyframes=K, azimuth=0, at=0.5)
+        people = SkeletonDisplay.from_estimator(pipe, FEW.data, keyframes=K)
     np.testing.assert_array_equal(match.times, expected.times)
     np.testing.assert_array_equal(display.match.times, expected.times)
     after = sync.transform(points, keyframes=K)[:, :, :1]

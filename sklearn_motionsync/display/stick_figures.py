@@ -116,7 +116,6 @@ class SkeletonDisplay(MovingDisplay):
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
     ) -> Self:
         """Draw poses of one trial, or of synchronised ones over each other.
 
@@ -131,8 +130,6 @@ class SkeletonDisplay(MovingDisplay):
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        azimuth : float, default=-60
-            See `plot`.
 
         Returns
         -------
@@ -146,7 +143,7 @@ class SkeletonDisplay(MovingDisplay):
         shown = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in shown]
         scenes = [[x[[frame]] for x in bodies] for frame in shown]
-        return cls._of(scenes=scenes, skeleton=skeleton, titles=titles).plot(ax, azimuth=azimuth)
+        return cls._of(scenes=scenes, skeleton=skeleton, titles=titles).plot(ax)
 
     @classmethod
     def from_trials(
@@ -157,8 +154,6 @@ class SkeletonDisplay(MovingDisplay):
         match: Match | None = None,
         names: Sequence[str] | None = None,
         ax: AxesLike | None = None,
-        at: float = 0.0,
-        azimuth: float = -60,
     ) -> Self:
         """Draw trials side by side, each at its own pace, such as two subjects and a blend.
 
@@ -174,10 +169,6 @@ class SkeletonDisplay(MovingDisplay):
         names : list of str, default=None
             The names under the trials; by default their labels in X, or numbers.
         ax : Axes or array-like of Axes, default=None
-            See `plot`.
-        at : float in [0, 1], default=0.0
-            See `plot`.
-        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -197,7 +188,7 @@ class SkeletonDisplay(MovingDisplay):
             durations = [recorded, [float(np.median(recorded))] * len(bodies)]
         return cls._of(
             scenes=scenes, skeleton=skeleton, titles=titles, durations=durations, labels=labels
-        ).plot(ax, at=at, azimuth=azimuth)
+        ).plot(ax)
 
     @classmethod
     def from_estimator(
@@ -207,8 +198,6 @@ class SkeletonDisplay(MovingDisplay):
         *,
         trials: Sequence[int] | np.ndarray | None = None,
         ax: AxesLike | None = None,
-        at: float = 0.0,
-        azimuth: float = -60,
         **params: Any,
     ) -> Self:
         """Draw trials as recorded above the same ones synchronised by a pipeline.
@@ -224,10 +213,6 @@ class SkeletonDisplay(MovingDisplay):
             others up to six in all.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        at : float in [0, 1], default=0.0
-            The moment that is drawn, as in `plot`.
-        azimuth : float, default=-60
-            The direction of view in degrees, as in `plot`.
         **params : dict
             Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
 
@@ -250,8 +235,6 @@ class SkeletonDisplay(MovingDisplay):
             match=Match(match.times[trials]),
             names=[f"{i} (pattern)" if i == pattern else str(i) for i in trials],
             ax=ax,
-            at=at,
-            azimuth=azimuth,
         )
 
     @classmethod
@@ -262,7 +245,6 @@ class SkeletonDisplay(MovingDisplay):
         frames: Sequence[float] | np.ndarray = (0.1, 0.4),
         random_state: RandomState = None,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
     ) -> Self:
         """Draw mean poses of a model, and of twelve random poses those that it accepts (Fig. 4).
 
@@ -276,8 +258,6 @@ class SkeletonDisplay(MovingDisplay):
         random_state : int, RandomState instance or None, default=None
             Determines the random poses; None draws others each time.
         ax : Axes or array-like of Axes, default=None
-            See `plot`.
-        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -317,7 +297,7 @@ class SkeletonDisplay(MovingDisplay):
                 f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
-        return cls._of(scenes=scenes, skeleton=skeleton, titles=titles).plot(ax, azimuth=azimuth)
+        return cls._of(scenes=scenes, skeleton=skeleton, titles=titles).plot(ax)
 
     @classmethod
     def from_departures(
@@ -329,7 +309,6 @@ class SkeletonDisplay(MovingDisplay):
         frames: int | Sequence[int] | np.ndarray = 6,
         reference: TrialsLike | None = None,
         ax: AxesLike | None = None,
-        azimuth: float = -60,
         **params: Any,
     ) -> Self:
         """Draw what is wrong with a trial: when, and with which limbs.
@@ -362,8 +341,6 @@ class SkeletonDisplay(MovingDisplay):
             One to five right trials of the same person, as for `find_departures`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        azimuth : float, default=-60
-            The direction of view in degrees, as in `plot`.
         **params : dict
             Further arguments of the synchronizer, such as ``keyframes``.
 
@@ -388,7 +365,7 @@ class SkeletonDisplay(MovingDisplay):
             **departing_bodies(
                 estimator, X, params, caller, trial=trial, frames=frames, reference=reference
             )
-        ).plot(ax, azimuth=azimuth)
+        ).plot(ax)
 
     def plot(
         self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float | None = None

@@ -94,7 +94,8 @@ def test_positions_in_a_plane_are_not_turned():
     seen = BUNCH.data[0].reshape(-1, 15, 3)[..., :2] * [100, -100] + [640, 300]
     X = seen.reshape(len(seen), -1)
     pictures = [
-        SkeletonDisplay.from_positions(X, skeleton, frames=[4], azimuth=a) for a in (-60, 0, 45)
+        SkeletonDisplay.from_positions(X, skeleton, frames=[4]).plot(azimuth=a)
+        for a in (-60, 0, 45)
     ]
     body, floor = seen[4] * [1, -1], -seen[..., 1].max()
     body = body - [body[0, 0], floor]
@@ -162,11 +163,11 @@ def test_without_bones_joints_are_points_and_limbs_join_landmarks():
 # -- without a skeleton ---------------------------------------------------------------------
 
 
-def points_drawn(x, panel=0, **given):
+def points_drawn(x, azimuth=None, **given):
     """The places of joints without a skeleton, (n_joints, 2)."""
-    display = SkeletonDisplay.from_positions(x, None, **given)
-    assert all(len(lines.get_paths()) == 0 for lines in display.bones_[panel].values())
-    return np.transpose(display.heads_[panel].get_data())
+    display = SkeletonDisplay.from_positions(x, None, **given).plot(azimuth=azimuth)
+    assert all(len(lines.get_paths()) == 0 for lines in display.bones_[0].values())
+    return np.transpose(display.heads_[0].get_data())
 
 
 def test_joints_without_a_skeleton_are_points():

@@ -150,10 +150,6 @@ def test_from_positions_refuses(arguments, message):
     ("arguments", "message"),
     [
         ({"names": ["a"]}, "names .* each of the 4 trials, got 1"),
-        *(
-            ({"at": bad}, "at must be a share of the time from 0 to 1, got")
-            for bad in (-0.1, 1.5, np.nan)
-        ),
         ({"match": Match(TIMES[:2])}, "2 matched trials, but 4"),
         ({"skeleton": 15}, "skeleton must be a Skeleton"),
         ({"X": [x[:, :9] for x in POSITIONS]}, "15 joints are"),
@@ -162,6 +158,11 @@ def test_from_positions_refuses(arguments, message):
 def test_from_trials_refuses(arguments, message):
     arguments = {"X": POSITIONS, "match": Match(TIMES), "skeleton": PAPER} | arguments
     refuses(lambda: SkeletonDisplay.from_trials(**arguments), message)
+
+
+@pytest.mark.parametrize("at", [-0.1, 1.5, np.nan])
+def test_plot_refuses_moments_beyond_the_trials(at):
+    refuses(lambda: draw_positions().plot(at=at), "at must be a share of the time from 0 to 1, got")
 
 
 @pytest.mark.parametrize("trials", [[99], [0.5], "01"])

@@ -57,7 +57,7 @@ def test_bones_seen_from_the_front_and_from_the_right():
     X = np.tile(body.ravel(), (3, 1))
     joints = dict(zip(PAPER.joints, body, strict=True))
     for azimuth, column in ((0, 0), (-90, 2)):
-        display = SkeletonDisplay.from_positions(X, PAPER, frames=[1], azimuth=azimuth)
+        display = SkeletonDisplay.from_positions(X, PAPER, frames=[1]).plot(azimuth=azimuth)
         left = [bone for bone in PAPER.bones if PAPER.joints[bone[1]].startswith("left")]
         expected = np.array([body[list(bone)][:, [column, 1]] for bone in left])
         drawn = bones_drawn(display, 0, "left")
@@ -135,7 +135,8 @@ def test_place_heading_and_vertical_axis_have_no_effect():
 
 
 def test_from_model_draws_mean_and_accepted_poses(pipe):
-    display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), random_state=0, azimuth=0)
+    display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), random_state=0)
+    display.plot(azimuth=0)
     titles = [axis.get_title() for axis in display.axes_]
     assert [title.split("\n")[0] for title in titles] == ["frame 4"] * 2 + ["frame 20"] * 2
     assert [len(bones_drawn(display, panel)) for panel in range(4)] == [14, 12 * 14, 14, 12 * 14]
@@ -169,7 +170,7 @@ def test_the_view_follows_a_body_that_walks_far(bunch):
     for X in (staying, staying + drift):
         display = SkeletonDisplay.from_positions(X, bunch.skeleton, frames=[0, 30])
         strips.append([bones_drawn(display, panel) for panel in (0, 1)])
-        display = SkeletonDisplay.from_trials([X], bunch.skeleton, at=0.7)
+        display = SkeletonDisplay.from_trials([X], bunch.skeleton).plot(at=0.7)
         moving.append(bones_drawn(display, 0))
     np.testing.assert_allclose(strips[0], strips[1], atol=1e-9)
     middle = np.abs(moving[1][:, :, 0]).max()
@@ -238,8 +239,8 @@ def test_from_trials_keeps_the_pace(bunch):
     assert [len(x) for x in scene] == [len(x) for x in X]
     assert [tick.get_text() for tick in display.axes_[0].get_xticklabels()] == ["a", "b", "c"]
     # The short one has ended while the others are half way.
-    middle = SkeletonDisplay.from_trials(X, bunch.skeleton, at=0.6)
-    ended = SkeletonDisplay.from_trials([X[1]], bunch.skeleton, at=1.0)
+    middle = SkeletonDisplay.from_trials(X, bunch.skeleton).plot(at=0.6)
+    ended = SkeletonDisplay.from_trials([X[1]], bunch.skeleton).plot(at=1.0)
     alone = np.sort(np.ptp(bones_drawn(ended, 0)[..., 1], axis=1))
     heights = np.ptp(bones_drawn(middle, 0)[..., 1], axis=1)
     assert np.isclose(heights[:, np.newaxis], alone).any(axis=0).all()
