@@ -1,14 +1,16 @@
 """Whether `compare_groups` keeps its level, and what it finds, beside other tests of curves.
 
     pip install spm1d fdasrsf fdatools
-    python benchmarks/comparison.py DATA_FOLDER [level] [unequal] [power] [covariate] [peers]
-        [nlreg1d] [--studies N]
+    python benchmarks/comparison.py DATA_FOLDER [level] [unequal] [designs] [power] [covariate]
+        [peers] [nlreg1d] [--studies N]
 
 *Level*: studies in which nothing differs, of 8 to 30 people of `make_gait` with two strides, one to
 four signals, groups, pairs or a covariate drawn at random; and of people drawn from the forces of a
 muscle (nlreg1d), in groups at random. Signals are scaled for the match and compared in their units,
 by 199 permutations at 5 %. *Unequal*: controls and patients whose smooth curves of one signal have
 so many times their spread, in all frames or in the second half; a bump of patients is so high.
+*Designs*: the effects of `compare_effects` in such curves, three conditions, groups and conditions,
+and two factors with an age that group 1 exceeds; and how often `bands` hold a bump at all times.
 *Power*: differences that `make_gait`
 makes between 10 or 20 people of two strides, four signals, by 399 permutations. In per cent.
 *Covariate*: an event that moves by 2 % of the trial with a standard deviation of the covariate
@@ -41,12 +43,13 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+import pandas as pd
 from harness import at_frames, command_line, percent, print_head, print_row, run_tables
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer
-from sklearn_motionsync.comparison import compare_events, compare_groups
+from sklearn_motionsync.comparison import compare_effects, compare_events, compare_groups
 from sklearn_motionsync.datasets import make_gait
 
 P, KNEE, LEVEL, PERMUTATIONS = 101, 1, 0.05, 999
@@ -93,19 +96,50 @@ def null_study(seed):
     return rows
 
 
+T = np.linspace(0, 1, 51)
+BUMP = np.exp(-0.5 * ((T - 0.5) / 0.1) ** 2)
+
+
+def smooth_curves(rng, n):
+    """Curves (n, 51) of variance 1."""
+    covariance = np.exp(-0.5 * ((T - T[:, np.newaxis]) / 0.12) ** 2)
+    return rng.standard_normal((n, 51)) @ np.linalg.cholesky(covariance + 1e-6 * np.eye(51)).T
+
+
 def unequal_study(seed, n_controls, n_patients, spread, height):
     """Whether controls and patients are called different."""
-    rng, t = np.random.default_rng(seed), np.linspace(0, 1, 51)
-    root = np.linalg.cholesky(
-        np.exp(-0.5 * ((t - t[:, np.newaxis]) / 0.12) ** 2) + 1e-6 * np.eye(51)
-    )
-    X = rng.standard_normal((n_controls + n_patients, 51)) @ root.T
+    X = smooth_curves(np.random.default_rng(seed), n_controls + n_patients)
     X[n_controls:] *= spread
-    X[n_controls:] += height * np.exp(-0.5 * ((t - 0.5) / 0.1) ** 2)
+    X[n_controls:] += height * BUMP
     y = [0] * n_controls + [1] * n_patients
     sync = LinearSynchronizer(51).fit(X)
     found = compare_groups(sync, X, y, n_permutations=199, random_state=seed)
     return found.p_joint <= LEVEL
+
+
+DESIGNS = {"condition": 3, "group * condition": 3, "group * sex + age": 1}
+
+
+def design_study(seed, formula, n_people, spread):
+    """Which effects that are not there are found, and whether the bands of groups hold a bump."""
+    rng, n_trials = np.random.default_rng(seed), DESIGNS[formula]
+    person, k = np.divmod(np.arange(n_people * n_trials), n_trials)
+    # With another spread a quarter of the people, or the third condition, has it.
+    group = person % 2 if spread == 1 else 1 * (person >= 3 * n_people // 4)
+    data = {"condition": np.array([*"abc"])[k], "group": np.array([*"xy"])[group]}
+    data["sex"] = np.array([*"fm"])[person // 2 % 2]
+    data["age"] = (rng.standard_normal(n_people) + group[::n_trials])[person]
+    scale = np.where((k == 2) if formula == "condition" else (group == 1), spread, 1)
+    X = smooth_curves(rng, n_people)[person] + smooth_curves(rng, len(person))
+    X *= scale[:, np.newaxis]
+    given = {"groups": person, "n_permutations": 199, "random_state": seed}
+    effects = compare_effects(LinearSynchronizer(51).fit(X), X, data, formula, **given)
+    X += 1.5 * BUMP * (group[:, np.newaxis])
+    held = compare_groups(LinearSynchronizer(51).fit(X), X, data["group"], **given).bands
+    held = held[held["what"] == "shape"]
+    inside = held["lower"].le(1.5 * BUMP) & held["upper"].ge(1.5 * BUMP)
+    found = {name: effect.p_shape <= LEVEL for name, effect in effects.items()}
+    return found | {"bands of groups": inside.all()}
 
 
 def power_study(seed, n_people, params):
@@ -367,6 +401,15 @@ def unequal_table(folder, n_studies=300):
         print_row(f"{n[0]}, {n[1]}, {name}, {height:g}", [percent(np.mean(Parallel(2)(work)))])
 
 
+def designs_table(folder, n_studies=300):
+    """How often effects are found that are not there, and how often bands hold a difference."""
+    for formula, n_people, spread in product(DESIGNS, (12, 20), (1, 3)):
+        work = (delayed(design_study)(k, formula, n_people, spread) for k in range(n_studies))
+        shares = 100 * pd.DataFrame(Parallel(2)(work)).mean()
+        print_head(f"{formula}, {n_people} people, spread {spread}", shares.index)
+        print_row("found in %", [f"{x:.1f}" for x in shares])
+
+
 def power_table(folder, n_studies=300):
     """How often each answer is given where groups differ."""
     print_head("people, they differ by", ANSWERS)
@@ -438,6 +481,7 @@ def nlreg1d_table(folder):
 TABLES = {
     "level": level_table,
     "unequal": unequal_table,
+    "designs": designs_table,
     "power": power_table,
     "covariate": covariate_table,
     "peers": peer_table,
@@ -447,7 +491,7 @@ TABLES = {
 
 def with_studies(options):
     """Have all tables but the last make so many studies."""
-    for name in [*TABLES][:5] if options.studies else ():
+    for name in [*TABLES][:6] if options.studies else ():
         TABLES[name] = partial(TABLES[name], n_studies=options.studies)
 
 

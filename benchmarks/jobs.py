@@ -259,11 +259,6 @@ def part_sync(data):
     return fit(lambda: PartSynchronizer(parts=parts), data.hops_on_clock)
 
 
-def keyframe_ft(data):
-    X, keyframes = data.hops_on_clock, np.full((33, 1), 50.0)
-    return Work(lambda: LinearSynchronizer(P).fit_transform(X, keyframes=keyframes))
-
-
 def clf_predict30(data):
     classifier = ActionClassifier().fit(*three_actions(20, 0))
     return Work(partial(classifier.predict, three_actions(10, 50)[0]))
@@ -282,11 +277,6 @@ def aspace_fit(data):
 def read_c3d(data):
     paths = [data.recorded(f"c3d/Eb015{take}.c3d") for take in ("pi", "pr", "si")]
     return Work(lambda: [read_motion(path) for path in paths])
-
-
-def read_amc(data):
-    path, skeleton = data.recorded("asf_amc/02_01.amc"), data.recorded("asf_amc/02.asf")
-    return Work(lambda: read_motion(path, asf=skeleton))
 
 
 def cycles_segment(data):
@@ -339,7 +329,6 @@ JOBS = {
     "fit_hops33": lambda data: fit(dense, data.hops_on_clock),
     "fit_curves400": lambda data: fit(dense, warped_sines(400)),
     "fit_n10": lambda data: fit(dense, data.hops_on_clock[:10]),
-    "fit_n2": lambda data: fit(dense, data.hops_on_clock[:2]),
     "fit_1feature": lambda data: fit(dense, data.hop_feature),
     "paper64_source": lambda data: fit(paper, data.copies),
     "paper64_walks": lambda data: fit(paper, data.walks),
@@ -349,10 +338,8 @@ JOBS = {
     "lone_paper": lambda data: lone(paper(), data.walks),
     "lone_1feature": lambda data: lone(dense(), data.hop_feature),
     "all_hops33": lambda data: of_all(dense(), data.hops_on_clock),
-    "all_paper40": lambda data: of_all(paper(), data.walks),
     "part_sync": part_sync,
     "linear_ft": lambda data: Work(lambda: LinearSynchronizer(P).fit_transform(data.hops_on_clock)),
-    "keyframe_ft": keyframe_ft,
     "model_only_fit": lambda data: fit(ActionModel, dense().fit_transform(data.hops_on_clock)),
     "model_predict": lambda data: of_all(with_model(), data.hops_on_clock, "predict"),
     "model_sample": lambda data: on_model(data, lambda pipe: pipe[-1].sample(20, random_state=0)),
@@ -384,7 +371,6 @@ JOBS = {
     "aspace_fit": aspace_fit,
     "read_bvh": lambda data: Work(partial(read_motion, data.recorded("bvh/007_01.bvh"))),
     "read_c3d": read_c3d,
-    "read_amc": read_amc,
     "cycles_fit": lambda data: fit(partial(CycleSegmenter, start=0), [long_walk()]),
     "cycles_segment": cycles_segment,
     "pairwise_velocity": lambda data: Work(partial(synchronization_distances, data.hops_on_clock)),

@@ -18,14 +18,12 @@ from ..synchronizers.match import Match
 from ..utils.groups import encode_groups
 from .curves import AlignedCurves
 from .groups import GroupComparison, compare_aligned
+from .permutations import Design, GroupDesign, check_test
 from .study import (
     OF_PEOPLE,
-    Design,
-    GroupDesign,
     Study,
     check_covariate,
     check_people,
-    check_test,
     check_units,
     means_of_people,
 )
@@ -68,8 +66,20 @@ def compare_effects(
         an interaction, and ``a * b`` both effects and their interaction.
     groups : sequence of length n_sequences, default=None
         The subject of each trial. By default every trial is of another person.
-    signals, features, level, n_permutations, unit, random_state, n_jobs, verbose
-        As for `compare_groups`. Each effect has this level.
+    signals, features : default=None
+        What is compared, as for `compare_groups`.
+    level : float, default=0.05
+        Level of each effect.
+    n_permutations : int, default=1999
+        Number of random permutations, or of flips of signs.
+    unit : {"percent", "frames", "seconds"}, default="percent"
+        Of places and offsets.
+    random_state : int, RandomState instance or None, default=0
+        Draws the permutations, the same for all effects.
+    n_jobs : int, default=None
+        Jobs that share the permutations, with the same result.
+    verbose : int, default=0
+        Above 0, print how far the permutations are, at most once a second.
     **params : dict
         What synchronizing X takes besides.
 

@@ -22,7 +22,8 @@ from ..inputs.validation import SequenceLevelMixin, check_input
 from ..io.events import is_table_of_events, keyframes_from_events
 from ..synchronizers.match import check_unit
 from ..utils.parallel import Progress
-from .study import GroupsOfPeople, Study, check_test, families
+from .permutations import check_test, families
+from .study import GroupsOfPeople, Study
 
 
 def compare_events(

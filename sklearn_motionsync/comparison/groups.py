@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -17,7 +17,8 @@ from ..matching.counting import first_largest, runs_of
 from ..synchronizers.match import UNITS, Match
 from ..utils.parallel import Progress
 from .curves import AlignedCurves
-from .study import Study, check_test, families, share_at_most
+from .permutations import check_test, families, share_at_most
+from .study import Study
 
 # A difference in timing that is left, as a share, whichever signal is left out of the match.
 _REMAINS = 0.5
@@ -56,7 +57,7 @@ class GroupComparison:
     smallest_p : float
         That all arrangements of the people allow: 0.125 for four pairs. If it is above ``level``,
         nothing can be found, and ``describe`` says so.
-    bands : DataFrame
+    bands : DataFrame, default=None
         How large each difference is, found or not, at every ``time`` in the unit: ``what``,
         ``feature``, ``difference`` in words ("B less A"), ``size``, and ``lower`` and ``upper``,
         between which the true difference lies with probability ``1 - level`` at all times, in all
@@ -88,7 +89,7 @@ class GroupComparison:
     design: str
     unit: Unit
     smallest_p: float
-    bands: pd.DataFrame = field(default_factory=pd.DataFrame)
+    bands: Any = None
 
     def __repr__(self):
         return f"GroupComparison({self.describe()!r})"

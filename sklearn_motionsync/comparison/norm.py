@@ -19,7 +19,7 @@ from ..model.variation import predictive_variance
 from ..synchronizers.match import UNITS, Match
 from ..utils.groups import encode_groups, refuse_classes_as_people
 from .curves import AlignedCurves
-from .study import check_level
+from .permutations import check_level
 
 # The variance at a frame is shrunk to the mean over the frames, which weighs as many people.
 _SHRINKAGE = 20

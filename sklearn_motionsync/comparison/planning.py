@@ -15,17 +15,17 @@ from ..inputs.types import Features, Labels, RandomState, TrialsLike
 from ..synchronizers.match import Match
 from ..utils.parallel import Progress
 from .curves import AlignedCurves
-from .study import (
+from .permutations import (
     Design,
     Family,
     GroupDesign,
-    Study,
     check_level,
     enhanced,
     families,
     order_of_values,
     share_at_most,
 )
+from .study import Study
 
 # Numbers of people that are tried; studies of each, in which there is nothing to find and of whose
 # people so many draws tell what chance does; and the power above which no more are tried.
@@ -59,8 +59,18 @@ def plan_study(
 
     Parameters
     ----------
-    estimator, X, y, groups, covariate, paired, signals, features, level, **params
-        The pilot study, as for `compare_groups`.
+    estimator : synchronizer, Pipeline with one, or Match of X
+        As for `compare_groups`, fitted on the trials of the pilot.
+    X : trials
+        Those of the pilot.
+    y : sequence of length n_sequences
+        What they are told apart by, as for `compare_groups`.
+    groups : sequence of length n_sequences, default=None
+        The subject of each trial. By default every trial is of another person.
+    covariate, paired : bool, default=False
+        As for `compare_groups`.
+    signals, features : default=None
+        What is compared, as for `compare_groups`.
     what : {"joint", "shape", "timing"}, default="joint"
         The answer that is to be found.
     change : float, default=1.0
@@ -68,11 +78,15 @@ def plan_study(
         too large by chance, so plan for less, such as 0.7.
     power : float, default=0.8
         The probability to find it.
+    level : float, default=0.05
+        Level of the tests, of all answers together.
     n_studies : int, default=400
         Simulated studies of each number of people. With 400, a power of 0.8 has a standard error
         of 0.02.
     random_state : int, RandomState instance or None, default=0
         Draws people and permutations.
+    **params : dict
+        What synchronizing X takes besides.
 
     Returns
     -------
@@ -120,15 +134,15 @@ def plan_study(
     values = [study.units(x) for x in (aligned.curves, aligned.offsets[:, :, np.newaxis])]
     rng, powers = check_random_state(random_state), {}
     for n in _SIZES:
-        powers[n] = _power(_Pilot(study, values, change), n, what, level, n_studies, rng)
+        powers[n] = power_of(Pilot(study, values, change), n, what, level, n_studies, rng)
         if powers[n] >= _ENOUGH:
             break
     table = pd.Series(powers, name="power").rename_axis("people").to_frame()
-    table.attrs["people"] = _least(table["power"], power, n_studies)
+    table.attrs["people"] = least_people(table["power"], power, n_studies)
     return table
 
 
-class _Pilot:
+class Pilot:
     """People like those of a pilot study.
 
     Parameters
@@ -176,7 +190,7 @@ class _Pilot:
         return Design(tested - tested.mean(axis=0)), values
 
 
-def _power(pilot, n, what, level, n_studies, rng):
+def power_of(pilot, n, what, level, n_studies, rng):
     """The share of studies of n people in which the answer is found."""
     quiet, tables = Progress(None, 0), []
     for _ in range(_NULL_STUDIES):
@@ -199,7 +213,7 @@ def _power(pilot, n, what, level, n_studies, rng):
     return float(np.mean(np.maximum(p[what], design.floor) <= level))
 
 
-def _least(powers, power, n_studies):
+def least_people(powers, power, n_studies):
     """The least number of people with a power, or None."""
     roots = np.sqrt(powers.index.to_numpy(dtype=float))
     edge = 0.5 / n_studies

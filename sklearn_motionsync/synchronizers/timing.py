@@ -57,7 +57,7 @@ class TimingChannel(LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEst
     See Also
     --------
     Match : Offsets and rates as arrays, and as a table; how sure they are.
-    metrics.amplitude_phase_variance : How much of the spread is timing.
+    Match.offsets_in : The offsets in frames and seconds.
 
     Notes
     -----

@@ -8,7 +8,8 @@ from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import LinearSynchronizer
 from sklearn_motionsync.comparison import compare_effects, compare_groups
 from sklearn_motionsync.comparison.effects import studies_of
-from sklearn_motionsync.comparison.study import Study, families
+from sklearn_motionsync.comparison.permutations import families
+from sklearn_motionsync.comparison.study import Study
 from sklearn_motionsync.utils.parallel import Progress
 
 N = 17

@@ -14,15 +14,15 @@ from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer
 from sklearn_motionsync.comparison import GroupComparison, compare_groups
 from sklearn_motionsync.comparison.curves import AlignedCurves
 from sklearn_motionsync.comparison.groups import compare_aligned
-from sklearn_motionsync.comparison.study import (
+from sklearn_motionsync.comparison.permutations import (
     Design,
     Family,
-    Study,
     enhanced,
     families,
     scaled,
     share_at_most,
 )
+from sklearn_motionsync.comparison.study import Study
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.utils.parallel import Progress
 

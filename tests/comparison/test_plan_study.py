@@ -7,8 +7,9 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.stats import norm
 from sklearn_motionsync import LinearSynchronizer
 from sklearn_motionsync.comparison import plan_study
-from sklearn_motionsync.comparison.planning import _least, _Pilot, _power
-from sklearn_motionsync.comparison.study import Study, families
+from sklearn_motionsync.comparison.permutations import families
+from sklearn_motionsync.comparison.planning import Pilot, least_people, power_of
+from sklearn_motionsync.comparison.study import Study
 from sklearn_motionsync.utils.parallel import Progress
 
 
@@ -20,13 +21,13 @@ def pilot_of(paired, height=1.4, n=60):
     noise = gaussian_filter1d(rng.standard_normal((2, 2 * n, 45, 1)), 4, axis=2)[:, :, 10:35]
     curves, offsets = noise / noise.std()
     curves += height * np.outer(y, np.exp(-0.5 * np.square((np.arange(25) - 12) / 4)))[..., None]
-    return _Pilot(study, [study.units(curves), study.units(offsets)], 1.0)
+    return Pilot(study, [study.units(curves), study.units(offsets)], 1.0)
 
 
 @pytest.mark.parametrize(("paired", "n"), [(False, 9), (True, 12)])
 def test_the_power_is_that_of_studies_with_permutations_of_their_own(paired, n):
     pilot, rng, found = pilot_of(paired), np.random.RandomState(0), 0
-    planned = _power(pilot, n, "shape", 0.05, 300, rng)
+    planned = power_of(pilot, n, "shape", 0.05, 300, rng)
     for _ in range(60):
         design, values = pilot.draw(n, rng)
         (shape,) = families(design, values[:1], 99, rng, progress=Progress(None, 0))
@@ -67,6 +68,6 @@ def test_the_least_number_lies_on_a_line_of_deviates():
     sizes = np.array([4, 9, 16, 25, 36])
     powers = pd.Series(norm.cdf(np.sqrt(sizes) - 3.5), index=sizes)
     # The root of 18.83 is 3.5 and the deviate of .8.
-    assert _least(powers, 0.8, 10**9) == 19
-    assert _least(powers, 0.05, 10**9) == 4
-    assert _least(powers, 0.999, 10**9) is None
+    assert least_people(powers, 0.8, 10**9) == 19
+    assert least_people(powers, 0.05, 10**9) == 4
+    assert least_people(powers, 0.999, 10**9) is None

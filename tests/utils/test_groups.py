@@ -16,7 +16,13 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     PartSynchronizer,
 )
-from sklearn_motionsync.comparison import compare_events, compare_groups, compare_to_norm
+from sklearn_motionsync.comparison import (
+    compare_effects,
+    compare_events,
+    compare_groups,
+    compare_to_norm,
+    plan_study,
+)
 from sklearn_motionsync.display import GroupDisplay, LagDisplay, SynchronizationDisplay
 from sklearn_motionsync.live import MotionTracker
 from sklearn_motionsync.report import write_report
@@ -56,12 +62,18 @@ METHODS = {
     "ActionClassifier.fit(y)": (lambda y: ActionClassifier(n_frames=10).fit(X, y), True),
     "MotionTracker.fit(groups)": (lambda g: MotionTracker(SYNC, 20).fit(X, groups=g), True),
     "PartSynchronizer.lags(groups)": (lambda g: PARTS.lags(X, groups=g), False),
+    "compare_effects(groups)": (
+        lambda p: compare_effects(SYNC, X, {"y": list("ababab")}, "y", groups=p, **FEW),
+        True,
+    ),
     "compare_events(y)": (lambda g: compare_events(X, EVENTS, g, **FEW), True),
     "compare_events(groups)": (lambda p: compare_events(X, EVENTS, Y, groups=p, **FEW), True),
     "compare_groups(y)": (lambda g: compare_groups(SYNC, X, g, **FEW), True),
     "compare_groups(groups)": (lambda p: compare_groups(SYNC, X, Y, groups=p, **FEW), True),
     "compare_to_norm(y)": (lambda g: compare_to_norm(SYNC, X, g, norm=next(iter(g))), True),
     "compare_to_norm(groups)": (lambda p: compare_to_norm(SYNC, X, Y, norm=0, groups=p), True),
+    "plan_study(y)": (lambda g: plan_study(SYNC, X, g, n_studies=10), True),
+    "plan_study(groups)": (lambda p: plan_study(SYNC, X, Y, groups=p, n_studies=10), True),
     "write_report(y)": (lambda g: report(y=g), True),
     "write_report(groups)": (lambda p: report(groups=p), False),
     "find_trials(groups)": (lambda g: find_trials(SYNC, X[0], groups=g), True),
