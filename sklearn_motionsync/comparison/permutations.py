@@ -204,6 +204,8 @@ class GroupDesign(Design):
         """Deviations with a common variance, whether they are known, and factors of variances."""
         values = values - np.nanmean(values, axis=0)
         known = np.isfinite(values) & _varies(np.sqrt(np.nansum(np.square(values), axis=0)))
+        # Usually all is known, and people are counted once for all values.
+        known = known[:, :1, :1] if known.all() else known
         values = np.where(known, values, 0)
         counts, means, variances = self._moments(self.members[np.newaxis], values, known)
         factors = self._factors(counts, variances)[0]
@@ -296,13 +298,13 @@ def enhanced(deviates):
     rows = np.full((len(signed), n_frames + 1), -np.inf, dtype=np.float32)
     rows[:, :-1] = signed
     is_positive, numbers, changes = rows >= _STEP, np.arange(len(rows)), np.zeros(rows.size)
-    width, height = n_frames + 1, 0.0
+    width, height, tops = n_frames + 1, 0.0, rows.max(axis=1)
     while True:
         height += _STEP
-        high = rows.max(axis=1) >= height
+        high = tops >= height
         if not high.any():
             break
-        rows, numbers = rows[high], numbers[high]
+        rows, numbers, tops = rows[high], numbers[high], tops[high]
         # Where runs of frames begin, and the first frames after them.
         edges = np.flatnonzero(np.diff((rows >= height).ravel(), prepend=False))
         row, frame = np.divmod(edges, width)
