@@ -18,7 +18,7 @@ from ..synchronizers.match import Match
 from ..utils.groups import encode_groups
 from .curves import AlignedCurves
 from .groups import GroupComparison, compare_aligned
-from .permutations import Design, GroupDesign, check_test
+from .permutations import EffectDesign, GroupDesign, check_test
 from .study import (
     OF_PEOPLE,
     Study,
@@ -110,8 +110,8 @@ def compare_effects(
       person has an effect, however people vary; tested is the mean over all people;
     - of one factor of people without other effects on the same values, people, as in
       `compare_groups`: groups may vary differently;
-    - of all else, what the other effects leave of people (Freedman and Lane 1983), which should
-      vary alike in all of them.
+    - of all else, the signs of what the other effects leave of people, divided by the spread of
+      their groups (De Santis and others, 2022).
 
     Effects of people are adjusted for each other, with groups that count alike, however many people
     they have (type III).
@@ -363,7 +363,10 @@ def _study(name, cells, within, between, others):
         levels, labels = np.vstack([np.zeros(model.shape[1]), levels]), [" and ".join(slopes)]
     elif slopes:
         prefixes = [", ".join(filter(None, [x, f"slope with {slopes[0]}"])) for x in prefixes]
-    design = Design(tested - tested.mean(axis=0), nuisance=nuisance - nuisance.mean(axis=0))
+    kept = np.delete(model, range(1, 1 + tested.shape[1]), axis=1)
+    of_people = {f.name: f.codes(cells.persons) for f in sum(others, between) if f.labels}
+    spreads = np.hstack([np.ones((n_people, 1)), *of_people.values()])
+    design = EffectDesign(tested, kept, spreads)
     return Study(design, makers, [labels] * len(makers), words, None, model, levels, prefixes)
 
 

@@ -371,7 +371,7 @@ def _confirm(rows, aligned, study):
 
     def effects(offsets):
         units = study.units(offsets[:, :, np.newaxis])
-        tested = study.design.rows[:, : study.design.n_tested].T
+        tested = study.design.rows.T
         return [(tested @ units[:, stretch].mean(axis=1)).ravel() for stretch in stretches]
 
     whole = effects(aligned.match.offsets)

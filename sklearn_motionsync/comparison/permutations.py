@@ -28,6 +28,8 @@ _LARGEST = 8.0
 LEAST_FACTOR = 1e-3
 # The spread of a group relative to the others is smoothed by a Gaussian of this share of the clock.
 _OF_CLOCK = 0.2
+# Steps of the regression of spreads.
+_STEPS = 10
 # Permutations that are looked at together.
 _BATCH = 250
 
@@ -41,9 +43,6 @@ class Design:
         Centred, unless signs are flipped.
     flips : bool, default=False
         Whether the signs of rows are flipped, as of paired differences, instead of a permutation.
-    nuisance : ndarray, shape (n_units, n_others), default=None
-        Centred columns that are not tested. What is left of the units without them is permuted
-        (Freedman and Lane, *J. Business & Economic Statistics* 1, 1983).
 
     Attributes
     ----------
@@ -53,18 +52,16 @@ class Design:
 
     floor = 0.0
 
-    def __init__(self, columns, flips=False, nuisance=None):
-        self.flips, self.n_tested = flips, columns.shape[1]
-        self.nuisance = columns[:, :0] if nuisance is None else np.linalg.qr(nuisance)[0]
-        apart = columns - self.nuisance @ (self.nuisance.T @ columns)
-        rows, triangle = np.linalg.qr(apart)
-        self.rows = np.column_stack([rows * np.sign(np.diagonal(triangle)), self.nuisance])
-        self.left = len(columns) - self.rows.shape[1] - (not flips)
+    def __init__(self, columns, flips=False):
+        rows, triangle = np.linalg.qr(columns)
+        self.rows, self.flips = rows * np.sign(np.diagonal(triangle)), flips
+        self.n_tested = columns.shape[1]
+        self.left = len(columns) - self.n_tested - (not flips)
 
     def rearranged(self, order):
         """The same of units in another order."""
         design = copy(self)
-        design.rows, design.nuisance = self.rows[order], self.nuisance[order]
+        design.rows = self.rows[order]
         return design
 
     @property
@@ -74,9 +71,6 @@ class Design:
 
     def prepare(self, values):
         """What `deviates` takes of values (n_units, P, n_features)."""
-        if self.nuisance.size:
-            values = np.nan_to_num(values - np.nanmean(values, axis=0))
-            values -= np.tensordot(self.nuisance, np.tensordot(self.nuisance.T, values, 1), 1)
         return scaled(values, not self.flips)
 
     def permuted(self, random_state):
@@ -101,11 +95,8 @@ class Design:
         """
         k = self.n_tested
         by_column = np.einsum("dnk,npf->dkpf", rows, units, optimize=True)
-        squares = np.square(by_column)
-        # What the nuisance takes of units in another order does not count.
-        total = 1 - squares[:, k:].sum(axis=1)
-        explained = np.minimum(squares[:, :k].sum(axis=1), total * (1 - _ROUNDING))
-        ratio = explained / (total - explained) * (self.left / k)
+        explained = np.minimum(np.square(by_column).sum(axis=1), 1 - _ROUNDING)
+        ratio = explained / (1 - explained) * (self.left / k)
         if k == 1:
             return self._of_t(np.sqrt(ratio) * np.sign(by_column[:, 0]))
         return self._of_f(ratio, k)
@@ -258,6 +249,82 @@ class GroupDesign(Design):
         kernel = np.exp(-0.5 * np.square(apart))
         smoothed = (kernel / kernel.sum(axis=1, keepdims=True)) @ ratios
         return np.maximum(smoothed, LEAST_FACTOR)
+
+
+class EffectDesign(Design):
+    """An effect beside others: signs are flipped of what the others leave of units.
+
+    Units are divided by their spread, whose logarithm is a sum over some columns: it is estimated
+    from all frames and features together. The flipped rows are standardised by what the others
+    leave of them (De Santis and others, *arXiv* 2209.13918, 2022).
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n_units, n_columns)
+        Those of the effect.
+    others : ndarray, shape (n_units, n_others)
+        Columns that are not tested, a constant among them.
+    spreads : ndarray, shape (n_units, n_spreads)
+        Columns of the logarithm of the spread, a constant among them.
+    """
+
+    def __init__(self, columns, others, spreads):
+        super().__init__(_apart(columns, np.linalg.qr(others)[0]), flips=True)
+        self.columns, self.others, self.spreads = columns, others, spreads
+        self.left -= others.shape[1]
+
+    def rearranged(self, order):
+        design = super().rearranged(order)
+        design.columns, design.others = self.columns[order], self.others[order]
+        design.spreads = self.spreads[order]
+        return design
+
+    @property
+    def observed(self):
+        return np.ones((len(self.rows), 1))
+
+    def permuted(self, random_state):
+        """Signs of the units."""
+        return random_state.choice([-1.0, 1.0], size=(len(self.rows), 1))
+
+    def prepare(self, values):
+        """Scaled units without the others, orthonormal rows of the effect, and of the others."""
+        scale = self.scale_of(values)[:, np.newaxis]
+        others = np.linalg.qr(self.others / scale)[0]
+        rows = np.linalg.qr(_apart(self.columns / scale, others))[0]
+        rows *= np.sign(np.sum(rows * self.rows, axis=0))
+        units = _apart(values / scale[:, np.newaxis], others)
+        return scaled(units, centred=False), rows, others
+
+    def scale_of(self, values):
+        """The spread of each unit, by a gamma regression of mean squares with a log link."""
+        fitted = np.linalg.qr(np.hstack([self.others, self.columns]))[0]
+        squares = np.square(_apart(values, fitted))
+        total = squares.mean(axis=0)
+        squares = np.divide(squares, total, out=np.zeros_like(squares), where=total > 0)
+        of_units = squares.mean(axis=(1, 2)) / np.maximum(1 - np.square(fitted).sum(axis=1), 0.1)
+        of_units = np.maximum(of_units, LEAST_FACTOR)
+        logs, inverse = np.zeros(len(of_units)), np.linalg.pinv(self.spreads)
+        for _ in range(_STEPS):
+            logs = self.spreads @ (inverse @ (logs + of_units / np.exp(logs) - 1))
+            logs = np.clip(logs, np.log(LEAST_FACTOR), -np.log(LEAST_FACTOR))
+        return np.exp(logs / 2)
+
+    def deviates(self, rows, units):
+        """As of a `Design`, of signs (n_draws, n_units, 1)."""
+        values, tested, others = units
+        flipped = rows * tested
+        left = flipped - others @ (others.T @ flipped)
+        _, spread, turned = np.linalg.svd(left, full_matrices=False)
+        turned = np.swapaxes(turned, 1, 2) / np.maximum(spread, _ROUNDING)[:, np.newaxis]
+        if self.n_tested == 1:
+            turned = np.abs(turned)
+        return super().deviates(flipped @ turned, values)
+
+
+def _apart(values, others):
+    """Values (n_units, ...) less what orthonormal columns tell of them."""
+    return values - np.tensordot(others, np.tensordot(others.T, values, 1), 1)
 
 
 def _ratio(size, error):

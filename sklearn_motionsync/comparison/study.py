@@ -14,7 +14,7 @@ from ..inputs.numbers import as_numbers
 from ..inputs.wording import counted
 from ..matching.counting import first_largest, first_smallest
 from ..utils.groups import encode_groups, refuse_classes_as_people
-from .permutations import LEAST_FACTOR, Design, GroupDesign
+from .permutations import LEAST_FACTOR, Design, EffectDesign, GroupDesign
 
 # Fewest units: people, or trials without people.
 _FEWEST = 4
@@ -262,8 +262,14 @@ class Study:
         inverse = np.linalg.pinv(columns.T @ columns)
         fitted = np.tensordot(inverse @ columns.T, values, 1)
         freedom = len(values) - columns.shape[1]
-        squares = np.square(values - np.tensordot(columns, fitted, 1)).sum(axis=0)
-        error = np.sqrt(squares / freedom * (change @ inverse @ change))
+        squares = np.square(values - np.tensordot(columns, fitted, 1))
+        if isinstance(self.design, EffectDesign):
+            # People may vary differently (HC3 of MacKinnon and White 1985).
+            leverage = np.einsum("nj,jk,nk->n", columns, inverse, columns)
+            influence = change @ inverse @ columns.T / np.maximum(1 - leverage, 0.1)
+            error = np.sqrt(np.tensordot(np.square(influence), squares, 1))
+        else:
+            error = np.sqrt(squares.sum(axis=0) / freedom * (change @ inverse @ change))
         return np.tensordot(change, fitted, 1), error, freedom
 
     def _interval(self, size, error, freedom, what, labels):

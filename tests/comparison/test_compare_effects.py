@@ -32,8 +32,9 @@ def deviate(study, values):
     return design.deviates(design.observed[np.newaxis], design.prepare(units))[0, 0]
 
 
-def squares_left(columns, values):
-    model = np.column_stack([np.ones(len(values)), *columns])
+def squares_left(columns, values, scale):
+    model = np.column_stack([np.ones(len(values)), *columns]) / scale[:, np.newaxis]
+    values = values / scale
     return np.square(values - model @ np.linalg.lstsq(model, values, rcond=None)[0]).sum()
 
 
@@ -45,30 +46,42 @@ def squares_left(columns, values):
         ("sex*age", ["sex", "age", "sex:age"]),
     ],
 )
-def test_effects_of_people_have_the_tails_of_nested_models(formula, effects):
+def test_effects_of_people_have_the_tails_of_nested_models_of_scaled_people(formula, effects):
     values = np.random.default_rng(0).standard_normal(N) + 0.03 * AGE + 2 * (GROUP == "b")
     studies = studies_of(PEOPLE, formula, None, N)
     assert list(studies) == effects
     columns = [column for effect in effects for column in COLUMNS[effect]]
-    left = squares_left(columns, values)
     freedom = N - 1 - len(columns)
     for effect in effects:
         others = [column for other in effects if other != effect for column in COLUMNS[other]]
-        k = len(COLUMNS[effect])
-        f = (squares_left(others, values) - left) / k / (left / freedom)
-        z = deviate(studies[effect], values)[0]
+        k, study = len(COLUMNS[effect]), studies[effect]
+        scale = study.design.scale_of(study.units(values[:, np.newaxis, np.newaxis]))
+        left = squares_left(columns, values, scale)
+        f = (squares_left(others, values, scale) - left) / k / (left / freedom)
+        z = deviate(study, values)[0]
         # One column has a signed t; several have F, which below its median has the deviate 0.
         tail = 2 * stats.norm.sf(abs(z)) if k == 1 else stats.norm.sf(z)
         expected = stats.f.sf(f, k, freedom)
         assert tail == pytest.approx(expected if k == 1 else min(expected, 0.5), rel=1e-3)
 
 
-def test_sizes_of_people_are_those_of_least_squares():
+def test_the_spread_of_groups_is_told_from_all_frames():
+    rng, person = np.random.default_rng(8), np.arange(60)
+    data = {"group": np.array([*"xyy"])[person % 3], "sex": np.array([*"fm"])[person // 3 % 2]}
+    spread = np.where(data["group"] == "y", 3, 1) * np.where(data["sex"] == "m", 2, 1)
+    values = spread[:, None, None] * rng.standard_normal((60, 40, 2)) * [1, 50]
+    scale = studies_of(data, "group + sex", None, 60)["group"].design.scale_of(values)
+    np.testing.assert_allclose(scale / scale[0], spread / spread[0], rtol=0.2)
+
+
+def test_sizes_of_people_are_those_of_least_squares_with_robust_errors():
     values = np.random.default_rng(1).standard_normal(N) + 2 * (SEX == "f") + 0.05 * AGE
     studies = studies_of(PEOPLE, "sex + age", None, N)
     model = np.column_stack([np.ones(N), SEX == "f", AGE])
-    fitted, left, *_ = np.linalg.lstsq(model, values, rcond=None)
-    errors = np.sqrt(np.diag(np.linalg.inv(model.T @ model)) * left[0] / (N - 3))
+    inverse = np.linalg.inv(model.T @ model)
+    fitted = inverse @ model.T @ values
+    left = (values - model @ fitted) / (1 - np.diag(model @ inverse @ model.T))
+    errors = np.sqrt(np.diag(inverse @ model.T @ np.diag(left**2) @ model @ inverse))
     half = stats.t.ppf(0.975, N - 3) * errors
     for name, k, words in (("sex", 1, "f above m"), ("age", 2, "higher with age")):
         found, size, lower, upper = studies[name].size(values, "shape")
