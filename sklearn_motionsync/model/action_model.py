@@ -109,7 +109,7 @@ class ActionModel(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
        normal distributions (Fig. 3d).
     2. The envelope is the mean, plus and minus ``n_std`` standard deviations. A pose is accepted at
        a frame if all of its features lie inside. Of new people it holds about 97 % of single values
-       with 3 standard deviations, and half of the whole poses, as many features may leave it.
+       with 3 standard deviations, and 55 % of the whole poses, as many features may leave it.
     3. The dissimilarity of a trial y is the mean over the three most similar training trials y_i
        of
 
@@ -451,7 +451,7 @@ class ActionModel(LongWorkMixin, SequenceLevelMixin, BaseEstimator):
         ----------
         simultaneous : bool, default=False
             False: ``n_std`` standard deviations of the training trials on both sides. At 3
-            it holds about 97 % of the *values* of new people and half of their *poses*, but hardly
+            it holds about 97 % of the *values* of new people and 55 % of their *poses*, but hardly
             a whole trial. True: it holds ``coverage`` of the *whole trials* of new people,
             at all frames and in all features: `simultaneous_factor` predicted standard deviations.
 
