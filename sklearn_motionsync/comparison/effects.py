@@ -21,7 +21,9 @@ from .groups import GroupComparison, compare_aligned
 from .permutations import EffectDesign, GroupDesign, check_test
 from .study import (
     OF_PEOPLE,
+    Change,
     Study,
+    changes_of_groups,
     check_covariate,
     check_people,
     check_units,
@@ -58,9 +60,10 @@ def compare_effects(
     X : trials
         As the estimator takes them.
     data : DataFrame, or dict of columns
-        One row a trial. Text, categories and truth values are factors, numbers are covariates. A
-        factor that differs within people is a condition: every person needs trials of all
-        combinations of conditions. A covariate is one of people, such as age.
+        One row a trial. Text, categories and truth values are factors, whose levels are in the
+        order of the categories, or sorted; numbers are covariates. A factor that differs within
+        people is a condition: every person needs trials of all combinations of conditions. A
+        covariate is one of people, such as age.
     formula : str
         Names of columns, such as ``"group * condition + age"``: ``+`` adds effects, ``a:b`` is
         an interaction, and ``a * b`` both effects and their interaction.
@@ -75,7 +78,7 @@ def compare_effects(
     unit : {"percent", "frames", "seconds"}, default="percent"
         Of places and offsets.
     random_state : int, RandomState instance or None, default=0
-        Draws the permutations, the same for all effects.
+        Draws the permutations.
     n_jobs : int, default=None
         Jobs that share the permutations, with the same result.
     verbose : int, default=0
@@ -180,6 +183,10 @@ class Factor(NamedTuple):
             codes, labels = encode_groups(list(values), len(values), name=f"data[{name!r}]")
             if len(labels) < 2:
                 raise ValueError(f"data: all trials have {labels[0]!r} in {name!r}.")
+            # In the order of categories, or sorted: whatever that of the trials is.
+            ranks = values.cat.categories if hasattr(values, "cat") else sorted(labels, key=str)
+            order = np.argsort([list(ranks).index(label) for label in labels])
+            codes, labels = np.argsort(order)[codes], [labels[k] for k in order]
             first = codes[np.unique(persons, return_index=True)[1]]
             return cls(name, [str(x) for x in labels], codes, bool((codes != first[persons]).any()))
         numbers = check_covariate(values.to_numpy(dtype=float), len(values), f"data[{name!r}]")
@@ -188,9 +195,9 @@ class Factor(NamedTuple):
         if within > OF_PEOPLE * of_people.std():
             raise ValueError(
                 f"data: {name!r} differs within people, by {within:.3g}, and between them by "
-                f"{of_people.std():.3g}. Give all trials of a person the same number, such as the "
-                "mean; compare_groups(..., covariate=True) tests slopes within people; and text "
-                "makes a factor of numbers."
+                f"{of_people.std():.3g}. Numbers are covariates: give conditions as text, such as "
+                f"data[{name!r}].astype(str); give all trials of a person the same number, such as "
+                "the mean; or test slopes within people by compare_groups(..., covariate=True)."
             )
         return cls(name, [], of_people[persons], False)
 
@@ -216,6 +223,11 @@ def studies_of(data, formula, groups, n):
         Number of trials.
     """
     persons, people = encode_groups(groups, n, at_least=2)
+    if not isinstance(data, (pd.DataFrame, Mapping)):
+        raise ValueError(
+            f"data must be a DataFrame or a dict of columns, one row a trial; got "
+            f"{type(data).__name__}."
+        )
     terms = _terms(formula, list(data))
     names = dict.fromkeys(name for term in terms for name in term)
     factors = {name: Factor.of(name, data[name], persons) for name in names}
@@ -243,18 +255,21 @@ def studies_of(data, formula, groups, n):
 
 def _terms(formula, columns):
     """The effects of a formula, as tuples of names: fewest names first."""
-    terms = []
+    terms, mentioned = [], []
     for part in str(formula).split("+"):
         separator = "*" if "*" in part else ":"
-        names = [name.strip() for name in part.split(separator)]
+        names = list(dict.fromkeys(name.strip() for name in part.split(separator)))
         for name in names:
             if name not in columns:
                 raise ValueError(
                     f"formula={formula!r}: {name!r} is no column of data, which has "
-                    f"{', '.join(map(repr, columns))}. Write 'a + b', 'a:b' or 'a * b'."
+                    f"{', '.join(map(repr, columns))}. Write 'a + b', 'a:b' or 'a * b', without "
+                    "'y ~' and '1'; rename columns that are no text, or hold +, * or :."
                 )
+        mentioned += names
         sizes = range(1, len(names) + 1) if separator == "*" else [len(names)]
         terms += [term for size in sizes for term in combinations(names, size)]
+    terms = [tuple(sorted(term, key=mentioned.index)) for term in terms]
     terms = sorted(dict.fromkeys(terms), key=len)
     for term in terms:
         for fewer in combinations(term, len(term) - 1):
@@ -295,9 +310,11 @@ class _Cells(NamedTuple):
             missing = np.flatnonzero(~makers[-1].any(axis=1))
             if len(missing):
                 labels = [f.labels[code] for f, code in zip(conditions, codes, strict=True)]
+                names = ", ".join(repr(factor.name) for factor in conditions)
                 raise ValueError(
-                    f"groups: {people[missing[0]]!r} has no trial of {', '.join(labels)}. All "
-                    "people need trials of all conditions: leave out people, or a condition."
+                    f"groups: {people[missing[0]]!r} has no trial of {', '.join(labels)}. What "
+                    f"differs within any person is a condition, here {names}, of which all people "
+                    "need trials. Mend labels that are wrong, or leave out people or a condition."
                 )
         return cls(persons, conditions, levels, np.array(makers))
 
@@ -338,36 +355,49 @@ def _study(name, cells, within, between, others):
     words = f"{name}, {n_people} people"
     less = [[f"{high} less {low}" for low, high in pair] for pair in pairs]
     if not between:
-        prefixes = [" and ".join(words_of[:-1]) for words_of in less]
-        return Study.of_differences(makers, [list(pair[-1]) for pair in pairs], words, prefixes)
+        changes = [
+            Change(list(pair[-1]), " and ".join(differences[:-1]))
+            for pair, differences in zip(pairs, less, strict=True)
+        ]
+        return Study.of_differences(makers, changes, words)
     check_units(n_people)
-    nuisance = [_columns(factors, cells.persons) for factors in others]
-    nuisance = np.hstack([np.empty((n_people, 0)), *nuisance])
-    prefixes = [" and ".join(words_of) for words_of in less]
-    names = [", ".join(labels) for labels in product(*(f.labels for f in between if f.labels))]
-    slopes = [f.name for f in between if not f.labels]
+    prefixes = [" and ".join(differences) for differences in less]
     if len(between) == 1 and not others and between[0].labels:
+        labels = between[0].labels
         codes = between[0].of_trials[np.unique(cells.persons, return_index=True)[1]]
-        check_people(codes, names)
-        return Study(
-            GroupDesign(codes), makers, [names] * len(makers), words, codes, prefixes=prefixes
-        )
+        check_people(codes, labels)
+        changes = [changes_of_groups(labels, prefix) for prefix in prefixes]
+        return Study(GroupDesign(codes), makers, changes, words, codes)
     tested = _columns(between, cells.persons)
-    model = np.hstack([np.ones((n_people, 1)), tested, nuisance])
+    kept = np.hstack([np.ones((n_people, 1)), *(_columns(x, cells.persons) for x in others)])
+    model = np.hstack([tested, kept])
     _check_apart(model, name)
-    rows = [reduce(np.kron, rows) for rows in product(*(f.levels for f in between))]
-    levels = np.zeros((len(rows), model.shape[1]))
-    levels[:, 1 : 1 + tested.shape[1]] = rows
-    labels = names
-    if slopes and len(slopes) == len(between):
-        levels, labels = np.vstack([np.zeros(model.shape[1]), levels]), [" and ".join(slopes)]
-    elif slopes:
-        prefixes = [", ".join(filter(None, [x, f"slope with {slopes[0]}"])) for x in prefixes]
-    kept = np.delete(model, range(1, 1 + tested.shape[1]), axis=1)
     of_people = {f.name: f.codes(cells.persons) for f in sum(others, between) if f.labels}
     spreads = np.hstack([np.ones((n_people, 1)), *of_people.values()])
-    design = EffectDesign(tested, kept, spreads)
-    return Study(design, makers, [labels] * len(makers), words, None, model, levels, prefixes)
+    changes = [list(_changes(between, prefix, model.shape[1])) for prefix in prefixes]
+    return Study(EffectDesign(tested, kept, spreads), makers, changes, words, model=model)
+
+
+def _changes(between, prefix, n_columns):
+    """Each `Change` of an effect of people: differences, of several factors of differences."""
+    factors = [factor for factor in between if factor.labels]
+    slopes = " and ".join(factor.name for factor in between if not factor.labels)
+    for chosen in product(*(combinations(range(len(f.labels)), 2) for f in factors)):
+        pairs = dict(zip([f.name for f in factors], chosen, strict=True))
+        differences = [
+            f.levels[pairs[f.name][1]] - f.levels[pairs[f.name][0]] if f.labels else f.levels[0]
+            for f in between
+        ]
+        columns = np.zeros(n_columns)
+        tested = reduce(np.kron, differences)
+        columns[: len(tested)] = tested
+        if not factors:
+            yield Change([slopes], prefix, columns=columns)
+            continue
+        named = [[f.labels[k] for k in pairs[f.name]] for f in factors]
+        prefixes = [prefix, *(f"{high} less {low}" for low, high in named[:-1])]
+        prefixes += [f"slope with {slopes}"] if slopes else []
+        yield Change(named[-1], " and ".join(filter(None, prefixes)), columns=columns)
 
 
 def _columns(factors, persons):

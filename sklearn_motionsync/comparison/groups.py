@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -310,7 +309,7 @@ def compare_aligned(
         level=float(level),
         design=study.words + study.spread(curves),
         unit=aligned.unit,
-        smallest_p=study.smallest_p,
+        smallest_p=study.design.smallest_p,
         bands=pd.DataFrame(
             {
                 name: np.concatenate([band[name] for band in bands])
@@ -328,13 +327,13 @@ def _clusters(what, family, values, names, units, study, least, level):
     """Rows of the table: stretches of frames with a corrected p of the level at most."""
     # The share of permutations in which shape or timing has a p as small.
     p = share_at_most(least, family.shares(np.abs(family.observed)))
-    p = np.maximum(p, study.design.floor)
+    p, scale = np.maximum(p, study.design.floor), study.design.scale_of(values)
     for column in range(p.shape[1]):
         contrast, k = divmod(column, len(names))
         for first, end in runs_of(p[:, column] <= level).tolist():
             stretch = slice(first, end)
             peak = first + first_largest(np.abs(family.observed[stretch, column]))
-            size = study.size(values[:, stretch, column].mean(axis=1), what, contrast)
+            size = study.size(values[:, stretch, column].mean(axis=1), what, contrast, scale)
             smallest = p[stretch, column].min()
             yield [what, names[k], first, end - 1, peak, smallest, *size, units[k]]
 
@@ -344,13 +343,14 @@ _OF_BANDS = ["what", "feature", "difference"]
 
 def _bands(what, values, aligned, names, study, z, level):
     """Columns of the table of bands, of each difference of each feature; z is that of all."""
+    scale = study.design.scale_of(values)
     for column in range(values.shape[2]):
         contrast, k = divmod(column, len(names))
-        for low, high in combinations(range(study.n_levels), 2):
-            size, error, freedom = study.change(values[:, :, column], low, high)
+        for change in study.changes[contrast]:
+            size, error, freedom = study.change(values[:, :, column], change, scale)
             all_times = study.design.critical(z, freedom) * error
             one_time = student.isf(level, freedom) * error
-            texts = what, names[k], study.called(contrast, low, high)
+            texts = what, names[k], change.name
             yield dict(zip(_OF_BANDS, ([text] * len(size) for text in texts), strict=True)) | {
                 "time": aligned.clock,
                 "size": size,

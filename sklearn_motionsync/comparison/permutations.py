@@ -58,11 +58,30 @@ class Design:
         self.n_tested = columns.shape[1]
         self.left = len(columns) - self.n_tested - (not flips)
 
+    @property
+    def smallest_p(self):
+        """The share of the arrangements of units that differ as much as the most extreme one.
+
+        With all signs flipped, with groups of one size exchanged, and with a symmetric covariate
+        reversed, units differ as much.
+        """
+        n, rows = len(self.rows), np.round(self.rows, 9)
+        if self.flips:
+            return 2 / 2**n
+        sizes = np.unique(rows, axis=0, return_counts=True)[1].tolist()
+        ends = np.sort(rows, axis=0)
+        alike = 2 if np.allclose(ends, -ends[::-1], atol=1e-8) else 1
+        return alike * math.prod(map(math.factorial, sizes)) / math.factorial(n)
+
     def rearranged(self, order):
         """The same of units in another order."""
         design = copy(self)
         design.rows = self.rows[order]
         return design
+
+    def scale_of(self, values):
+        """The spread of each unit by which units are weighed; None if all count alike."""
+        return None
 
     @property
     def observed(self):
@@ -126,7 +145,8 @@ class Design:
 
 def _even_in_t(t, left):
     """The variable of Wallace (*Ann. Math. Stat.* 30, 1959): deviates are nearly linear in it."""
-    return np.sqrt(left * np.log1p(np.square(t) / left))
+    with np.errstate(over="ignore"):
+        return np.sqrt(left * np.log1p(np.square(t) / left))
 
 
 @lru_cache(maxsize=32)
@@ -174,6 +194,10 @@ class GroupDesign(Design):
         members = (groups[:, np.newaxis] == np.arange(len(self.counts))).astype(float)
         super().__init__(members[:, 1:] - members[:, 1:].mean(axis=0))
         self.members = members
+
+    @property
+    def smallest_p(self):
+        return self.floor
 
     def rearranged(self, order):
         design = super().rearranged(order)

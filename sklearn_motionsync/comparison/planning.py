@@ -121,7 +121,7 @@ def plan_study(
     """
     check_level(level)
     for name, value, most in (("power", power, 1), ("change", change, np.inf)):
-        if not (isinstance(value, Real) and 0 < value < most):
+        if isinstance(value, bool) or not (isinstance(value, Real) and 0 < value < most):
             raise ValueError(f"{name} must be a number above 0 and below {most}, got {value!r}.")
     if not (isinstance(n_studies, Integral) and n_studies >= 10):
         raise ValueError(f"n_studies must be a whole number of at least 10, got {n_studies!r}.")
@@ -201,16 +201,17 @@ def power_of(pilot, n, what, level, n_studies, rng):
         Family(None, np.concatenate([each[k].largest[1:] for each in tables]), None)
         for k in range(2)
     )
-    deviates = [[], []]
+    deviates, floors = [[], []], []
     for _ in range(n_studies):
         design, values = pilot.draw(n, rng)
+        floors.append(max(design.smallest_p, 1 / len(shape.ranks)))
         for of_curves, x in zip(deviates, values, strict=True):
             of_curves.append(design.deviates(design.observed[np.newaxis], design.prepare(x)))
     largest = [np.abs(enhanced(np.concatenate(x))).max(axis=(1, 2)) for x in deviates]
     p = {"shape": shape.shares(largest[0]), "timing": timing.shares(largest[1])}
     least = np.minimum(shape.ranks, timing.ranks)
     p["joint"] = share_at_most(least, np.minimum(p["shape"], p["timing"]))
-    return float(np.mean(np.maximum(p[what], design.floor) <= level))
+    return float(np.mean(np.maximum(p[what], floors) <= level))
 
 
 def least_people(powers, power, n_studies):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
@@ -14,7 +14,7 @@ from ..inputs.numbers import as_numbers
 from ..inputs.wording import counted
 from ..matching.counting import first_largest, first_smallest
 from ..utils.groups import encode_groups, refuse_classes_as_people
-from .permutations import LEAST_FACTOR, Design, EffectDesign, GroupDesign
+from .permutations import LEAST_FACTOR, Design, GroupDesign
 
 # Fewest units: people, or trials without people.
 _FEWEST = 4
@@ -23,6 +23,51 @@ _FEWEST = 4
 OF_PEOPLE = 0.1
 # From so large a ratio of variances on, the answer tells it.
 _UNEQUAL = 2.0
+
+
+class Change(NamedTuple):
+    """A difference between two levels of what is compared, or a slope.
+
+    Attributes
+    ----------
+    labels : list of str
+        Of the first and the second level; of a slope, what it is along.
+    prefix : str, default=""
+        What differences are compared, if these are no values as they are.
+    levels : tuple of int, default=(0, 1)
+        The two groups of units, if groups are compared.
+    columns : ndarray, shape (n_columns,), default=None
+        Else the change of the columns of the model.
+    """
+
+    labels: list
+    prefix: str = ""
+    levels: tuple = (0, 1)
+    columns: np.ndarray | None = None
+
+    @property
+    def name(self):
+        """In words, such as "B less A"."""
+        words = " less ".join(self.labels[::-1])
+        words = words if len(self.labels) > 1 else f"slope with {words}"
+        return f"{self.prefix}: {words}" if self.prefix else words
+
+    def direction(self, size, what):
+        """In words, such as "B above A"."""
+        slope = len(self.labels) == 1
+        higher = "later" if what == "timing" else "higher" if slope else "above"
+        lower = "earlier" if what == "timing" else "lower" if slope else "below"
+        word = higher if size > 0 else lower
+        than = " than" if what == "timing" else ""
+        first, *second = self.labels
+        words = f"{word} with {first}" if slope else f"{second[0]} {word}{than} {first}"
+        return f"{self.prefix}: {words}" if self.prefix else words
+
+
+def changes_of_groups(labels, prefix=""):
+    """The `Change` between each two groups."""
+    pairs = combinations(range(len(labels)), 2)
+    return [Change([labels[low], labels[high]], prefix, (low, high)) for low, high in pairs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,27 +80,21 @@ class Study:
     makers : ndarray, shape (n_contrasts, n_units, n_sequences)
         The values of a unit are such a matrix times those of the trials: a mean, a difference
         of means, or a slope. Of several conditions there is a contrast for each two.
-    labels : list of list of str
-        Of each contrast, what is above what; for a slope, what it is along.
+    changes : list of list of Change
+        Of each contrast, what is compared.
     words : str
     groups : ndarray of int, shape (n_units,), or None
         Of each unit, if groups of units are compared that may vary differently.
     model : ndarray, shape (n_units, n_columns), or None
         Else sizes are by least squares, with these columns.
-    levels : ndarray, shape (n_levels, n_columns), or None
-        The columns of each level that is compared.
-    prefixes : list of str
-        Of each contrast, what differences are compared; empty for values as they are.
     """
 
     design: Design
     makers: np.ndarray
-    labels: list
+    changes: list
     words: str
     groups: np.ndarray | None = None
     model: np.ndarray | None = None
-    levels: np.ndarray | None = None
-    prefixes: Sequence[str] = ("",)
 
     def units(self, values):
         """Values (n_units, P, n_contrasts * n_features) of those (n_sequences, P, n_features).
@@ -103,7 +142,8 @@ class Study:
         check_people(of_units, labels)
         listed = f"{', '.join(labels[:-1])} and {labels[-1]}"
         words = f"{listed}, {_count_units(len(of_units), n, groups is not None)}"
-        return cls(GroupDesign(of_units), maker[np.newaxis], [labels], words, of_units)
+        changes = [changes_of_groups(labels)]
+        return cls(GroupDesign(of_units), maker[np.newaxis], changes, words, of_units)
 
     @classmethod
     def _of_pairs(cls, codes, labels, persons, names):
@@ -124,15 +164,15 @@ class Study:
                 )
         maker = makers[1] - makers[0]
         words = f"{labels[1]} less {labels[0]}, {len(maker)} people"
-        return cls.of_differences(maker[np.newaxis], [labels], words)
+        return cls.of_differences(maker[np.newaxis], [Change(labels)], words)
 
     @classmethod
-    def of_differences(cls, makers, labels, words, prefixes=("",)):
-        """Differences or slopes of people, whose mean is compared with 0."""
+    def of_differences(cls, makers, changes, words):
+        """Differences or slopes of people, one a contrast, whose mean is compared with 0."""
         ones = np.ones((makers.shape[1], 1))
         check_units(len(ones))
-        design, levels = Design(ones, flips=True), np.array([[0.0], [1.0]])
-        return cls(design, makers, labels, words, None, ones, levels, prefixes)
+        changes = [[change._replace(columns=np.ones(1))] for change in changes]
+        return cls(Design(ones, flips=True), makers, changes, words, model=ones)
 
     @classmethod
     def _of_covariate(cls, covariate, persons, named):
@@ -143,12 +183,11 @@ class Study:
         spread, between = np.sqrt(np.square(within).mean()), of_units.std()
         if spread <= OF_PEOPLE * between:
             check_units(len(maker))
-            design = Design((of_units - of_units.mean())[:, np.newaxis])
+            centred = (of_units - of_units.mean())[:, np.newaxis]
             words = f"Regression, {_count_units(len(maker), len(covariate), named)}"
-            model = np.column_stack([np.ones(len(maker)), of_units])
-            levels = np.array([[0.0, 0.0], [0.0, 1.0]])
-            labels = [["the covariate"]]
-            return cls(design, maker[np.newaxis], labels, words, model=model, levels=levels)
+            changes = [[Change(["the covariate"], columns=np.array([0.0, 1.0]))]]
+            model = np.hstack([np.ones((len(maker), 1)), centred])
+            return cls(Design(centred), maker[np.newaxis], changes, words, model=model)
         if spread < between:
             warnings.warn(
                 f"y differs by {spread:.3g} within people, and by {between:.3g} between them. "
@@ -162,25 +201,7 @@ class Study:
         varies = squares > np.square(OF_PEOPLE * spread) * np.bincount(persons)
         maker = slopes[varies] / squares[varies, np.newaxis]
         words = f"Regression within {len(maker)} people"
-        return cls.of_differences(maker[np.newaxis], [["the covariate"]], words)
-
-    @property
-    def smallest_p(self):
-        """The share of the arrangements of units that differ as much as the most extreme one.
-
-        With both signs flipped, with groups of one size exchanged, and with a symmetric covariate
-        reversed, units differ as much.
-        """
-        n = self.makers.shape[1]
-        if self.design.flips:
-            return 2 / 2**n
-        if self.groups is not None:
-            return self.design.floor
-        rows = np.round(self.design.rows, 9)
-        sizes = np.unique(rows, axis=0, return_counts=True)[1].tolist()
-        ends = np.sort(rows, axis=0)
-        alike = 2 if np.allclose(ends, -ends[::-1], atol=1e-8) else 1
-        return alike * math.prod(map(math.factorial, sizes)) / math.factorial(n)
+        return cls.of_differences(maker[np.newaxis], [Change(["the covariate"])], words)
 
     def spread(self, values):
         """In words, if people of one group vary twice as much in variance as those of another.
@@ -190,7 +211,7 @@ class Study:
         if self.groups is None:
             return ""
         variances = np.array(
-            [values[self.groups == k].var(axis=0, ddof=1) for k in range(self.n_levels)]
+            [values[self.groups == k].var(axis=0, ddof=1) for k in np.unique(self.groups)]
         )
         whole = variances.mean(axis=0)
         shares = np.divide(variances, whole, out=np.ones_like(variances), where=whole > 0)
@@ -199,58 +220,40 @@ class Study:
         ratio = of_groups[high] / max(of_groups[low], LEAST_FACTOR)
         if ratio < _UNEQUAL:
             return ""
-        labels = self.labels[0]
+        change = next(x for x in self.changes[0] if {*x.levels} == {low, high})
+        labels = dict(zip(change.levels, change.labels, strict=True))
         return f", variance of {labels[high]} {ratio:.2g} times that of {labels[low]}"
 
-    def size(self, values, what, contrast=0):
-        """Direction in words, size, and its interval of 95 %, of a value a unit; NaN is unknown."""
-        labels, low, high = self.labels[contrast], 0, 1
-        if len(labels) > 2:
-            means = self._means_of_levels(values)
-            low, high = first_smallest(means), first_largest(means)
-        size, error, freedom = map(float, self.change(values, low, high))
-        words, *numbers = self._interval(size, error, freedom, what, self.pair(contrast, low, high))
-        prefix = self.prefixes[contrast]
-        return f"{prefix}: {words}" if prefix else words, *numbers
+    def size(self, values, what, contrast=0, scale=None):
+        """Direction in words, size, and its interval of 95 %, of a value a unit; NaN is unknown.
 
-    def pair(self, contrast, low, high):
-        """The labels of two levels of a contrast; of a slope what it is along."""
-        labels = self.labels[contrast]
-        return [labels[low], labels[high]] if len(labels) > 1 else labels
+        Of several changes, the largest.
+        """
+        changes = self.changes[contrast]
+        found = [self.change(values, change, scale) for change in changes]
+        k = first_largest([abs(size) for size, *_ in found])
+        change, (size, error, freedom) = changes[k], map(float, found[k])
+        if len(changes) > 1 and size < 0:
+            change, size = change._replace(labels=change.labels[::-1]), -size
+        half = float(student.ppf(0.975, freedom) * error)
+        return change.direction(size, what), size, size - half, size + half
 
-    def called(self, contrast, low, high):
-        """A difference between two levels of a contrast in words."""
-        pair, prefix = self.pair(contrast, low, high), self.prefixes[contrast]
-        words = f"{pair[1]} less {pair[0]}" if len(pair) > 1 else f"slope with {pair[0]}"
-        return f"{prefix}: {words}" if prefix else words
-
-    @property
-    def n_levels(self):
-        """How many levels are compared."""
-        return len(self.levels) if self.groups is None else self.groups.max() + 1
-
-    def _means_of_levels(self, values):
-        """Of a value a unit."""
-        if self.groups is not None:
-            return [np.nanmean(values[self.groups == k]) for k in range(self.groups.max() + 1)]
-        is_known = ~np.isnan(values)
-        return self.levels @ np.linalg.lstsq(self.model[is_known], values[is_known], rcond=None)[0]
-
-    def change(self, values, low, high):
-        """From one level to another: its size, standard error and degrees of freedom.
+    def change(self, values, change, scale=None):
+        """The size of a change, its standard error and degrees of freedom.
 
         Parameters
         ----------
         values : ndarray, shape (n_units,) or (n_units, ...)
             NaN, which is unknown, of single values only.
-        low, high : int
-            Levels.
+        change : Change
+        scale : ndarray, shape (n_units,), default=None
+            Spread of the units, by which they are weighed.
         """
         is_known = ~np.isnan(values) if values.ndim == 1 else slice(None)
         values = values[is_known]
         if self.groups is not None:
             # Welch's test, for groups that vary differently.
-            a, b = (values[self.groups[is_known] == k] for k in (low, high))
+            a, b = (values[self.groups[is_known] == k] for k in change.levels)
             shares = np.stack([x.var(axis=0, ddof=1) / len(x) for x in (a, b)])
             degrees = shares[0] ** 2 / (len(a) - 1) + shares[1] ** 2 / (len(b) - 1)
             total = shares.sum(axis=0)
@@ -258,29 +261,14 @@ class Study:
                 total**2, degrees, out=np.full_like(degrees, np.inf), where=degrees > 0
             )
             return b.mean(axis=0) - a.mean(axis=0), np.sqrt(total), freedom
-        columns, change = self.model[is_known], self.levels[high] - self.levels[low]
-        inverse = np.linalg.pinv(columns.T @ columns)
-        fitted = np.tensordot(inverse @ columns.T, values, 1)
-        freedom = len(values) - columns.shape[1]
-        squares = np.square(values - np.tensordot(columns, fitted, 1))
-        if isinstance(self.design, EffectDesign):
-            # People may vary differently (HC3 of MacKinnon and White 1985).
-            leverage = np.einsum("nj,jk,nk->n", columns, inverse, columns)
-            influence = change @ inverse @ columns.T / np.maximum(1 - leverage, 0.1)
-            error = np.sqrt(np.tensordot(np.square(influence), squares, 1))
-        else:
-            error = np.sqrt(squares.sum(axis=0) / freedom * (change @ inverse @ change))
-        return np.tensordot(change, fitted, 1), error, freedom
-
-    def _interval(self, size, error, freedom, what, labels):
-        half = student.ppf(0.975, freedom) * error
-        slope = len(labels) == 1
-        higher = "later" if what == "timing" else "higher" if slope else "above"
-        lower = "earlier" if what == "timing" else "lower" if slope else "below"
-        word = higher if size > 0 else lower
-        than = " than" if what == "timing" else ""
-        words = f"{word} with {labels[0]}" if slope else f"{labels[1]} {word}{than} {labels[0]}"
-        return words, size, size - half, size + half
+        weights = 1 / (np.ones(len(self.model)) if scale is None else scale)[is_known]
+        values = (values.T * weights).T
+        rows, triangle = np.linalg.qr(self.model[is_known] * weights[:, np.newaxis])
+        influence = rows @ np.linalg.solve(triangle.T, change.columns)
+        left = values - np.tensordot(rows, np.tensordot(rows.T, values, 1), 1)
+        freedom = len(values) - rows.shape[1]
+        error = np.sqrt(np.square(left).sum(axis=0) / freedom * (influence @ influence))
+        return np.tensordot(influence, values, 1), error, freedom
 
 
 @dataclass(frozen=True, eq=False)

@@ -74,20 +74,47 @@ def test_the_spread_of_groups_is_told_from_all_frames():
     np.testing.assert_allclose(scale / scale[0], spread / spread[0], rtol=0.2)
 
 
-def test_sizes_of_people_are_those_of_least_squares_with_robust_errors():
+@pytest.mark.parametrize(("shift", "factor"), [(0, 1), (1e5, 1), (0, 1e8), (7e5, -365)])
+def test_sizes_of_people_are_those_of_weighed_least_squares(shift, factor):
+    """In the unit of the covariate, however large its numbers are."""
     values = np.random.default_rng(1).standard_normal(N) + 2 * (SEX == "f") + 0.05 * AGE
-    studies = studies_of(PEOPLE, "sex + age", None, N)
-    model = np.column_stack([np.ones(N), SEX == "f", AGE])
-    inverse = np.linalg.inv(model.T @ model)
-    fitted = inverse @ model.T @ values
-    left = (values - model @ fitted) / (1 - np.diag(model @ inverse @ model.T))
-    errors = np.sqrt(np.diag(inverse @ model.T @ np.diag(left**2) @ model @ inverse))
-    half = stats.t.ppf(0.975, N - 3) * errors
-    for name, k, words in (("sex", 1, "f above m"), ("age", 2, "higher with age")):
-        found, size, lower, upper = studies[name].size(values, "shape")
-        assert found == words
-        expected = [fitted[k], fitted[k] - half[k], fitted[k] + half[k]]
-        np.testing.assert_allclose([size, lower, upper], expected)
+    studies = studies_of({"sex": SEX, "age": factor * AGE + shift}, "sex + age", None, N)
+    of_units = values[:, np.newaxis, np.newaxis]
+    model = np.column_stack([np.ones(N), SEX == "m", AGE])
+    for name, k in (("sex", 1), ("age", 2)):
+        scale = studies[name].design.scale_of(of_units)
+        inverse = np.linalg.inv((model.T / scale**2) @ model)
+        fitted = inverse @ (model.T / scale**2) @ values
+        left = (np.square((values - model @ fitted) / scale)).sum() / (N - 3)
+        half = stats.t.ppf(0.975, N - 3) * np.sqrt(left * inverse[k, k])
+        expected = np.array([fitted[k], fitted[k] - half, fitted[k] + half])
+        if name == "age":
+            expected = np.sort(expected / factor)[[1, 0, 2]]
+        found, *numbers = studies[name].size(values, "shape", scale=scale)
+        assert found == (
+            "m below f" if k == 1 else f"{'higher' if factor > 0 else 'lower'} with age"
+        )
+        np.testing.assert_allclose(numbers, expected, rtol=1e-6)
+
+
+def test_factors_of_people_cross_in_differences_of_differences():
+    cells = {("A", "f"): 0, ("A", "m"): 1, ("B", "f"): 0, ("B", "m"): 3}
+    group, sex = np.array(list("AABB" * 5)), np.array(list("fm" * 10))
+    values = np.array([cells[pair] for pair in zip(group, sex, strict=True)], dtype=float)
+    values += 0.01 * np.random.default_rng(0).standard_normal(20)
+    data = {"group": group, "sex": sex}
+    study = studies_of(data, "group * sex + sex:group", None, 20)["group:sex"]
+    words, size, lower, upper = study.size(values, "shape")
+    assert words == "B less A: m above f"
+    assert size == pytest.approx(2, abs=0.02)
+    assert lower < 2 < upper
+    assert [change.name for change in study.changes[0]] == ["B less A: m less f"]
+    # The slope with a covariate, by group.
+    age = np.random.default_rng(1).uniform(20, 60, 20)
+    slopes = studies_of(data | {"age": age}, "group * age", None, 20)["group:age"]
+    words, size, *_ = slopes.size(np.where(group == "B", 0.1, 0.02) * age, "shape")
+    assert words == "slope with age: B above A"
+    assert size == pytest.approx(0.08)
 
 
 def test_conditions_are_compared_two_by_two_in_each_person():
@@ -122,11 +149,12 @@ def test_two_conditions_cross_in_differences_of_differences():
     data = {"shoe": ["old", "old", "new", "new"] * 5, "slope": ["up", "down"] * 10}
     values = np.random.default_rng(4).standard_normal(n)
     study = studies_of(data, "shoe * slope", person, n)["shoe:slope"]
+    # Levels are sorted: new before old, down before up.
     old_up, old_down, new_up, new_down = values.reshape(5, 4).T
-    expected = (new_down - old_down) - (new_up - old_up)
+    expected = (old_up - new_up) - (old_down - new_down)
     np.testing.assert_allclose(study.units(values[:, None, None])[:, 0, 0], expected)
     words, size, *_ = study.size(expected, "shape")
-    assert words == f"new less old: down {'above' if size > 0 else 'below'} up"
+    assert words == f"old less new: up {'above' if size > 0 else 'below'} down"
 
 
 def test_two_conditions_alone_are_pairs_of_compare_groups():
@@ -135,7 +163,8 @@ def test_two_conditions_alone_are_pairs_of_compare_groups():
     X = [np.sin(3 * t + rng.normal(0, 0.1) + 0.2 * (k % 2))[:, None] for k in range(14)]
     match = LinearSynchronizer(30).fit(X).match(X)
     pairs = compare_groups(match, X, y, groups=person, paired=True, n_permutations=199)
-    effects = compare_effects(match, X, {"when": y}, "when", groups=person, n_permutations=199)
+    when = pd.Categorical(y, categories=["before", "after"])
+    effects = compare_effects(match, X, {"when": when}, "when", groups=person, n_permutations=199)
     assert list(effects) == ["when"]
     assert effects["when"].p_shape == pairs.p_shape <= 0.05
     columns = ["feature", "start", "end", "p", "direction", "size", "lower", "upper"]
@@ -191,7 +220,7 @@ def test_bands_hold_the_true_difference_at_all_frames(ratio, n, n_studies):
             study.design, [values], 199, np.random.RandomState(seed), progress=Progress(None, 0)
         )
         z = np.quantile(family.peaks, 0.95, method="higher")
-        size, error, freedom = study.change(values, 0, 1)
+        size, error, freedom = study.change(values, study.changes[0][0])
         held.append((np.abs(size - truth) <= study.design.critical(z, freedom) * error).all())
     error = np.sqrt(0.95 * 0.05 / n_studies)
     assert np.mean(held) == pytest.approx(0.95, abs=3 * error)
@@ -201,6 +230,7 @@ def test_bands_hold_the_true_difference_at_all_frames(ratio, n, n_studies):
     ("formula", "changed", "message"),
     [
         ("group + weight", {}, "'weight' is no column of data, which has 'group', 'sex', 'age'"),
+        ("y ~ group", {}, "without 'y ~' and '1'"),
         ("group:sex", {}, "has group:sex without group: write group \\* sex"),
         ("group + side", {"side": ["l", "r"] + ["l"] * (N - 2)}, "groups: 2 has no trial of r"),
         (

@@ -88,6 +88,13 @@ def test_values_are_scaled_to_a_length_of_one_if_they_vary():
     np.testing.assert_allclose(scaled(gap, True)[:, 0, 0], np.array([-1, 0, 0, 1]) / np.sqrt(2))
 
 
+def test_groups_without_any_spread_differ_without_a_warning():
+    design = Study.of([0, 0, 0, 1, 1, 1], None, covariate=False, paired=False, n=6).design
+    values = np.repeat([0.0, 1.0], 3)[:, np.newaxis, np.newaxis]
+    found = design.deviates(design.observed[np.newaxis], design.prepare(values))
+    assert found.ravel() == pytest.approx([8])
+
+
 def test_shares_of_draws_count_equal_ones():
     family = Family(None, np.array([2.0, 1, 3, 2]), None)
     assert family.ranks.tolist() == [0.75, 1, 0.25, 0.75]
@@ -208,7 +215,7 @@ def test_p_of_one_value_and_the_smallest_are_shares_of_all_arrangements(y):
         assert family.p_value == pytest.approx(exact, abs=4 * np.sqrt(exact * (1 - exact) / 5e3))
     assert len(family.ranks) == 5000
     arranged = of_all_arrangements(extreme, y)
-    assert study.smallest_p == pytest.approx(np.isclose(arranged, arranged.max()).mean())
+    assert study.design.smallest_p == pytest.approx(np.isclose(arranged, arranged.max()).mean())
 
 
 class Handmade(AlignedCurves):

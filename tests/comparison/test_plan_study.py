@@ -64,6 +64,14 @@ def test_smaller_differences_need_more_people():
             plan_study(match, X, y, **wrong)
 
 
+def test_studies_that_cannot_find_anything_have_no_power():
+    pilot, rng = pilot_of(paired=True, height=9), np.random.RandomState(0)
+    # The least p of five pairs is .0625.
+    assert power_of(pilot, 5, "shape", 0.05, 20, rng) == 0
+    assert power_of(pilot, 7, "shape", 0.05, 20, rng) > 0.5
+    assert power_of(pilot, 7, "shape", 1e-4, 20, rng) == 0
+
+
 def test_the_least_number_lies_on_a_line_of_deviates():
     sizes = np.array([4, 9, 16, 25, 36])
     powers = pd.Series(norm.cdf(np.sqrt(sizes) - 3.5), index=sizes)
