@@ -49,8 +49,8 @@ class GroupComparison:
     level : float
         As given.
     design : str
-        What was compared, in words; with the ratio of the variances of curves of the groups, if one
-        is twice another: then the larger group, and p, tell less.
+        What was compared, in words; with the ratio of the variances of two groups, if one is twice
+        the other, and more than by chance.
     unit : {"frames", "percent", "seconds"}
         Of start, end, peak, and of the sizes of timing.
     smallest_p : float

@@ -8,6 +8,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from ..inputs.numbers import as_numbers
@@ -204,7 +205,7 @@ class Study:
         return cls.of_differences(maker[np.newaxis], [Change(["the covariate"])], words)
 
     def spread(self, values):
-        """In words, if people of one group vary twice as much in variance as those of another.
+        """In words, if the variance of one group is twice that of another, and not by chance.
 
         ``values`` (n_units, P, n_columns) count by their variance over all groups.
         """
@@ -218,7 +219,8 @@ class Study:
         of_groups = shares.mean(axis=(1, 2))
         low, high = first_smallest(of_groups), first_largest(of_groups)
         ratio = of_groups[high] / max(of_groups[low], LEAST_FACTOR)
-        if ratio < _UNEQUAL:
+        freedom = np.bincount(self.groups)[[high, low]] - 1
+        if ratio < max(_UNEQUAL, fisher.isf(0.025, *freedom)):
             return ""
         change = next(x for x in self.changes[0] if {*x.levels} == {low, high})
         labels = dict(zip(change.levels, change.labels, strict=True))

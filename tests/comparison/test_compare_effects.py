@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import LinearSynchronizer
 from sklearn_motionsync.comparison import compare_effects, compare_groups
 from sklearn_motionsync.comparison.effects import studies_of
-from sklearn_motionsync.comparison.permutations import families
+from sklearn_motionsync.comparison.permutations import EffectDesign, GroupDesign, families
 from sklearn_motionsync.comparison.study import Study
 from sklearn_motionsync.utils.parallel import Progress
 
@@ -63,6 +63,38 @@ def test_effects_of_people_have_the_tails_of_nested_models_of_scaled_people(form
         tail = 2 * stats.norm.sf(abs(z)) if k == 1 else stats.norm.sf(z)
         expected = stats.f.sf(f, k, freedom)
         assert tail == pytest.approx(expected if k == 1 else min(expected, 0.5), rel=1e-3)
+
+
+def test_signs_are_flipped_of_what_others_leave_and_standardised():
+    """One draw against its definition, for two columns; and in any order of people."""
+    rng, n = np.random.default_rng(10), 15
+    # With an effect, as F below its median has the deviate 0.
+    values = rng.standard_normal((n, 1, 1)) + 5 * (np.arange(n) % 3 == 1)[:, None, None]
+    age = rng.uniform(20, 60, n)
+    design = studies_of({"group": [*"abc"] * 5, "age": age}, "group + age", None, n)["group"].design
+    scale = design.scale_of(values)[:, np.newaxis]
+    others, columns = design.others / scale, design.columns / scale
+    project = np.eye(n) - others @ np.linalg.pinv(others)
+    left, signs = project @ (values[:, :, 0] / scale), np.ones((n, 1))
+    signs[[2, 5, 9]] = -1
+    flipped = signs * (project @ columns)
+    score = flipped.T @ left
+    explained = score.T @ np.linalg.inv(flipped.T @ project @ flipped) @ score / (left.T @ left)
+    f = explained.item() / (1 - explained.item()) * (n - 4) / 2
+    for order in (np.arange(n), rng.permutation(n)):
+        moved = design.rearranged(order)
+        np.testing.assert_allclose(moved.scale_of(values[order]), scale[order, 0])
+        z = moved.deviates(signs[order][np.newaxis], moved.prepare(values[order])).item()
+        assert z == pytest.approx(stats.norm.isf(stats.f.sf(f, 2, n - 4)), abs=1e-4)
+        assert z > 0.1
+    assert design.critical(2.0, 11) ** 2 == pytest.approx(2 * stats.f.isf(stats.norm.sf(2), 2, 11))
+
+
+def test_few_people_of_a_group_are_not_told_to_vary_less():
+    values = np.random.default_rng(11).standard_normal((9, 3000, 1))
+    data = {"group": [*"aaaaaabbb"], "age": [30.0, 40, 50] * 3}
+    scale = studies_of(data, "group + age", None, 9)["group"].design.scale_of(values)
+    np.testing.assert_allclose(scale, scale.mean(), rtol=0.05)
 
 
 def test_the_spread_of_groups_is_told_from_all_frames():
@@ -148,13 +180,33 @@ def test_two_conditions_cross_in_differences_of_differences():
     person, n = np.repeat(range(5), 4), 20
     data = {"shoe": ["old", "old", "new", "new"] * 5, "slope": ["up", "down"] * 10}
     values = np.random.default_rng(4).standard_normal(n)
-    study = studies_of(data, "shoe * slope", person, n)["shoe:slope"]
+    studies = studies_of(data, "shoe * slope", person, n)
+    study = studies["shoe:slope"]
     # Levels are sorted: new before old, down before up.
     old_up, old_down, new_up, new_down = values.reshape(5, 4).T
     expected = (old_up - new_up) - (old_down - new_down)
     np.testing.assert_allclose(study.units(values[:, None, None])[:, 0, 0], expected)
     words, size, *_ = study.size(expected, "shape")
     assert words == f"old less new: up {'above' if size > 0 else 'below'} down"
+    # An effect alone is the mean over the other condition.
+    mean = ((old_up - new_up) + (old_down - new_down)) / 2
+    np.testing.assert_allclose(studies["shoe"].units(values[:, None, None])[:, 0, 0], mean)
+
+
+def test_contrasts_stand_one_behind_the_other_with_all_features():
+    person, data = np.repeat(range(4), 3), {"shoe": ["a", "b", "c"] * 4, "group": [*"xxxyyy"] * 2}
+    data["age"] = 10.0 * person
+    values = np.random.default_rng(9).standard_normal((12, 5, 2))
+    studies = studies_of(data, "shoe * group + age", person, 12)
+    by_shoe = values.reshape(4, 3, 5, 2)
+    pairs = [by_shoe[:, high] - by_shoe[:, low] for low, high in ((0, 1), (0, 2), (1, 2))]
+    np.testing.assert_allclose(studies["shoe"].units(values), np.concatenate(pairs, axis=2))
+    # An age is beside the groups in the means, and not in the differences of conditions.
+    assert isinstance(studies["shoe:group"].design, GroupDesign)
+    assert isinstance(studies["group"].design, EffectDesign)
+    four = {"a": [*"xxyy"], "b": [*"xyxy"]}
+    with pytest.raises(ValueError, match="cannot be told from the others with these 4 people"):
+        studies_of(four, "a * b", None, 4)
 
 
 def test_two_conditions_alone_are_pairs_of_compare_groups():
@@ -174,7 +226,7 @@ def test_two_conditions_alone_are_pairs_of_compare_groups():
 def test_bands_hold_intervals_of_welch_and_grow_with_what_is_held():
     rng, t = np.random.default_rng(6), np.linspace(0, 1, 25)
     y = np.array(list("aab" * 5))
-    spread = np.where(y == "a", 0.1, 0.3)
+    spread = np.where(y == "a", 0.1, 0.6)
     X = [np.outer(np.sin(3 * t + rng.normal(0, s)), [1, 2]) + rng.normal(0, s) for s in spread]
     found = compare_groups(LinearSynchronizer(25).fit(X), X, y, n_permutations=199)
     assert "15 trials, variance of b" in found.describe()
@@ -191,11 +243,18 @@ def test_bands_hold_intervals_of_welch_and_grow_with_what_is_held():
         assert (band["lower"] < test.confidence_interval(0.95).low[:, k]).all()
         largest = np.abs([interval.low[:, k], interval.high[:, k]]).max()
         assert found.within().loc["shape", f"x{k}", "b less a"] == pytest.approx(largest)
+    # The margin is that of both signs; people who vary alike have no ratio of variances.
+    negative = [-x for x in X]
+    less = compare_groups(LinearSynchronizer(25).fit(negative), negative, y, n_permutations=99)
+    np.testing.assert_allclose(less.within().to_numpy(), found.within().to_numpy())
     # Several groups: each two of them.
     y = np.array(list("abc" * 5))
     found = compare_groups(LinearSynchronizer(25).fit(X), X, y, n_permutations=199, features=[0])
     differences = found.bands.loc[found.bands["what"] == "shape", "difference"]
     assert differences.unique().tolist() == ["b less a", "c less a", "c less b"]
+    alike = [x + rng.normal(0, 0.2) for x in [X[0]] * 20]
+    found = compare_groups(LinearSynchronizer(25).fit(alike), alike, [*"ab"] * 10)
+    assert "variance" not in found.describe()
 
 
 @pytest.mark.parametrize(

@@ -444,6 +444,28 @@ def test_slopes_within_people_and_what_is_compared_in_words():
     assert Study.of(**given | {"paired": True, "n": 16}).words == "b less a, 4 people"
 
 
+def test_bands_are_those_of_shape_and_timing_together():
+    rng = np.random.default_rng(3)
+    curves = np.cumsum(rng.standard_normal((10, 20, 2)), axis=1)
+    # Of white noise many frames are independent, so the largest deviates are those of the timing.
+    offsets = rng.standard_normal((10, 20))
+    aligned = Handmade.of_arrays(curves, offsets)
+    found = compare_aligned(aligned, STUDY, 0, n_permutations=199)
+    units = [STUDY.units(x) for x in (curves, offsets[..., None], aligned.even, offsets[..., None])]
+    shape, timing, _ = families(
+        *(STUDY.design, units[:3], 199, np.random.RandomState(0)),
+        by=units[3:],
+        progress=Progress(None, 0),
+    )
+    largest = np.quantile(np.maximum(shape.peaks, timing.peaks), 0.95, method="higher")
+    size, error, freedom = STUDY.change(units[0][..., 1], STUDY.changes[0][0])
+    band = found.bands.query("feature == 'hip'")
+    np.testing.assert_allclose(band["size"], size)
+    half = stats.t.isf(stats.norm.sf(largest), freedom) * error
+    np.testing.assert_allclose(band["upper"] - band["size"], half)
+    assert largest > np.quantile(shape.peaks, 0.95, method="higher")
+
+
 def test_a_difference_in_timing_is_called_timing(late):
     gait, pipe = late
     found = compare_groups(

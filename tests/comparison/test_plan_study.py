@@ -48,6 +48,13 @@ def test_people_of_a_pilot_have_its_means_and_covariances():
             drawn, known = values[rows, :, 0], deviations[k][:, :, 0]
             np.testing.assert_allclose(drawn.mean(axis=0), fitted[k, :, 0], atol=0.08)
             np.testing.assert_allclose(np.cov(drawn.T), known.T @ known, atol=0.12)
+    # Those of the noise of the pilot, whose variance is 1.
+    assert np.cov(offsets[:4000, :, 0].T).diagonal().mean() == pytest.approx(1, abs=0.1)
+    values = np.random.default_rng(2).standard_normal((6, 2000, 1))
+    study = Study.of([*"aaabbb"], None, covariate=False, paired=False, n=6)
+    (drawn,) = Pilot(study, [values], 1.0).draw(50, np.random.RandomState(0))[1]
+    spread = np.mean([drawn[k : k + 50].var(axis=0, ddof=1).mean() for k in (0, 50)])
+    assert spread == pytest.approx(1, abs=0.15)
 
 
 def test_smaller_differences_need_more_people():
