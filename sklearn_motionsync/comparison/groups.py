@@ -60,9 +60,9 @@ class GroupComparison:
         How large each difference is, found or not, at every ``time`` in the unit: ``what``,
         ``feature``, ``difference`` in words ("B less A"), ``size``, and ``lower`` and ``upper``,
         between which the true difference lies with probability ``1 - level`` at all times, in all
-        features, of shape and timing together; with less, .8 for .95, where a group is three people
-        who vary more. ``least`` and ``most`` are the interval of ``1 - 2 level`` at this time
-        alone, for `within`.
+        features, of shape and timing together; with less, .8 for .95, where a group of three people
+        varies more than the other. ``least`` and ``most`` are the interval of ``1 - 2 level`` at
+        this time alone, for `within`.
 
     Examples
     --------
