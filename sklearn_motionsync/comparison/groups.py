@@ -286,10 +286,12 @@ def compare_aligned(
         progress=Progress(type("compare_groups", (), {})(), verbose),
     )
     least = np.minimum(shape.ranks, timing.ranks)
-    unit = UNITS[aligned.unit]
+    unit, scales = UNITS[aligned.unit], [study.design.scale_of(x) for x in (curves, offsets)]
     rows = [
-        *_clusters("shape", shape, curves, aligned.names, aligned.units, study, least, level),
-        *_clusters("timing", timing, offsets, ["offset"], [unit], study, least, level),
+        *_clusters(
+            "shape", shape, curves, scales[0], aligned.names, aligned.units, study, least, level
+        ),
+        *_clusters("timing", timing, offsets, scales[1], ["offset"], [unit], study, least, level),
     ]
     rows = [row for row, sure in zip(rows, _confirm(rows, aligned, study), strict=True) if sure]
     table = pd.DataFrame(rows, columns=_COLUMNS).sort_values("p", kind="stable", ignore_index=True)
@@ -297,8 +299,8 @@ def compare_aligned(
         table[name] = aligned.clock[table[name].to_numpy(dtype=int)]
     z = float(np.quantile(np.maximum(shape.peaks, timing.peaks), 1 - level, method="higher"))
     bands = [
-        *_bands("shape", curves, aligned, aligned.names, study, z, level),
-        *_bands("timing", offsets, aligned, ["offset"], study, z, level),
+        *_bands("shape", curves, scales[0], aligned, aligned.names, study, z, level),
+        *_bands("timing", offsets, scales[1], aligned, ["offset"], study, z, level),
     ]
     return GroupComparison(
         p_joint=max(float(share_at_most(least, least[0])), study.design.floor),
@@ -324,11 +326,11 @@ _COLUMNS = ["what", "feature", "start", "end", "peak", "p"]
 _COLUMNS += ["direction", "size", "lower", "upper", "unit"]
 
 
-def _clusters(what, family, values, names, units, study, least, level):
+def _clusters(what, family, values, scale, names, units, study, least, level):
     """Rows of the table: stretches of frames with a corrected p of the level at most."""
     # The share of permutations in which shape or timing has a p as small.
     p = share_at_most(least, family.shares(np.abs(family.observed)))
-    p, scale = np.maximum(p, study.design.floor), study.design.scale_of(values)
+    p = np.maximum(p, study.design.floor)
     for column in range(p.shape[1]):
         contrast, k = divmod(column, len(names))
         for first, end in runs_of(p[:, column] <= level).tolist():
@@ -342,9 +344,8 @@ def _clusters(what, family, values, names, units, study, least, level):
 _OF_BANDS = ["what", "feature", "difference"]
 
 
-def _bands(what, values, aligned, names, study, z, level):
+def _bands(what, values, scale, aligned, names, study, z, level):
     """Columns of the table of bands, of each difference of each feature; z is that of all."""
-    scale = study.design.scale_of(values)
     for column in range(values.shape[2]):
         contrast, k = divmod(column, len(names))
         for change in study.changes[contrast]:

@@ -28,8 +28,8 @@ _LARGEST = 8.0
 LEAST_FACTOR = 1e-3
 # The spread of a group relative to the others is smoothed by a Gaussian of this share of the clock.
 _OF_CLOCK = 0.2
-# Steps of the regression of spreads.
-_STEPS = 10
+# Steps of the regression of spreads, which hardly changes after five.
+_REGRESSION = 10
 # Permutations that are looked at together.
 _BATCH = 250
 
@@ -329,7 +329,7 @@ class EffectDesign(Design):
         of_units = squares.mean(axis=(1, 2)) / np.maximum(1 - np.square(fitted).sum(axis=1), 0.1)
         of_units = np.maximum(of_units, LEAST_FACTOR)
         logs, inverse = np.zeros(len(of_units)), np.linalg.pinv(self.spreads)
-        for _ in range(_STEPS):
+        for _ in range(_REGRESSION):
             logs = self.spreads @ (inverse @ (logs + of_units / np.exp(logs) - 1))
             logs = np.clip(logs, np.log(LEAST_FACTOR), -np.log(LEAST_FACTOR))
         return np.exp(logs / 2)
